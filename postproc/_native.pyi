@@ -297,9 +297,6 @@ def scan_lines(
     list[int],
 ]: ...
 
-# spans.rs: where numbers stand in a text, in few bytes each
-def number_spans(start: Indices, end: Indices) -> SpanColumns: ...
-
 # rescan.rs: a text that differs from one read before in numbers
 def rescan_lines(
     before: bytes,
@@ -315,7 +312,7 @@ def scan_statements(
 ) -> tuple[
     list[bytes],
     tuple[Indices, Indices, Indices, Indices, Indices],
-    tuple[Indices, Indices, Floats],
+    tuple[SpanColumns, Floats],
     tuple[NameColumn, Indices],
     list[int],
 ]: ...
@@ -324,7 +321,7 @@ def scan_krl(
 ) -> tuple[
     list[bytes],
     tuple[Indices, Indices, Indices, Indices, Indices],
-    tuple[Indices, Indices, Floats],
+    tuple[SpanColumns, Floats],
     tuple[NameColumn, Indices],
     list[int],
 ]: ...
@@ -363,7 +360,12 @@ def compare_lines(
 # weave.rs: edits of texts (`postproc.language.source`)
 def weave(data: bytes, start: Indices, end: Indices, new: Bytes) -> bytes: ...
 def is_woven(
-    data: bytes, start: Indices, end: Indices, new: Bytes, found: bytes, skipped: int
+    data: bytes,
+    start: Indices,
+    end: Indices,
+    new: Bytes,
+    found: bytes,
+    stamp: tuple[int, int],
 ) -> bool: ...
 def cut(data: bytes, start: Indices, end: Indices) -> Bytes: ...
 

@@ -17,6 +17,7 @@ import pytest
 from postproc import _native
 from postproc.arrays import few_rows, floats
 from postproc.compensation.compensate import compensate
+from postproc.language.text.source import NumberSpans
 from postproc.model.effects.backlash_profile import BacklashProfile
 from postproc.model.kinematics import ArmStates
 from postproc.motion import blending
@@ -542,4 +543,5 @@ def test_statements_of_rapid(random):
         assert np.diff(first).tolist() == [len(s.numbers) for s in meant]
         assert len(names[1]) == sum(len(s.names) for s in meant)
         places = [place for s in meant for place in s.numbers]
-        assert list(zip(*(c.tolist() for c in numbers[:2]), strict=True)) == places
+        where = NumberSpans(*numbers[0])
+        assert list(zip(where.start, where.end, strict=True)) == places

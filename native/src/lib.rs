@@ -101,7 +101,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(logical::scan_logical_lines, module)?)?;
     module.add_function(wrap_pyfunction!(rescan::rescan_lines, module)?)?;
-    module.add_function(wrap_pyfunction!(spans::number_spans, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_krl, module)?)?;
     module.add_function(wrap_pyfunction!(spline::splines, module)?)?;

@@ -1,10 +1,7 @@
 //! Where numbers stand in a text, in few bytes each: `postproc.language.source`.
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
+use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
-
-use crate::rows::{each, flat, same_length};
 
 /// Numbers whose places are told from that of the first of them.
 pub const TOGETHER: usize = 16;
@@ -28,6 +25,14 @@ impl Narrow {
             Narrow::One(own) => own.len(),
             Narrow::Two(own) => own.len(),
             Narrow::Four(own) => own.len(),
+        }
+    }
+
+    fn reserve(&mut self, count: usize) {
+        match self {
+            Narrow::One(own) => own.reserve(count),
+            Narrow::Two(own) => own.reserve(count),
+            Narrow::Four(own) => own.reserve(count),
         }
     }
 
@@ -78,11 +83,16 @@ pub type Columns<'py> = (Bound<'py, PyArray1<i32>>, Bound<'py, PyAny>, Bound<'py
 impl Spans {
     /// Make room for so many numbers that stand close together.
     pub fn for_numbers(count: usize) -> Self {
-        Spans {
-            base: Vec::with_capacity(count.div_ceil(TOGETHER)),
-            offset: Narrow::One(Vec::with_capacity(count)),
-            length: Narrow::One(Vec::with_capacity(count)),
-        }
+        let mut found = Spans::default();
+        found.reserve(count);
+        found
+    }
+
+    /// Make room for so many more.
+    pub fn reserve(&mut self, count: usize) {
+        self.base.reserve(count.div_ceil(TOGETHER));
+        self.offset.reserve(count);
+        self.length.reserve(count);
     }
 
     pub fn len(&self) -> usize {
@@ -106,23 +116,4 @@ impl Spans {
         let (offset, length) = (self.offset.into_array(py), self.length.into_array(py));
         (self.base.into_pyarray(py), offset, length)
     }
-}
-
-/// Keep where numbers begin and end, in ascending order, (m,), in few bytes.
-#[pyfunction]
-pub fn number_spans<'py>(
-    py: Python<'py>,
-    start: PyReadonlyArray1<'py, i32>,
-    end: PyReadonlyArray1<'py, i32>,
-) -> PyResult<Columns<'py>> {
-    let (start, end) = (flat(&start)?, flat(&end)?);
-    same_length(&[start.len(), end.len()])?;
-    let falls = start.windows(2).any(|two| two[0] > two[1]);
-    if falls || start.first().is_some_and(|at| *at < 0) || start.iter().zip(end).any(|(a, b)| a > b)
-    {
-        return Err(PyValueError::new_err("numbers that are not in ascending order"));
-    }
-    let mut found = Spans::for_numbers(start.len());
-    each(py, start.len(), |i| found.push(start[i] as usize, end[i] as usize))?;
-    Ok(found.into_arrays(py))
 }

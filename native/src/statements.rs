@@ -12,6 +12,7 @@ use crate::interned::Interned;
 use crate::names::NameColumn;
 use crate::number::value_of;
 use crate::rows::detached;
+use crate::spans::{Columns, Spans};
 use crate::text::{
     is, number_end, push_hidden, while_is, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY,
 };
@@ -486,7 +487,7 @@ pub fn mask_krl_line(line: &[u8], masked: &mut Masked) {
 type Scanned<'py> = (
     Bound<'py, PyList>,
     (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
-    (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>),
+    (Columns<'py>, Column<'py, f64>),
     (NameColumn, Column<'py, i32>),
     Vec<usize>,
 );
@@ -494,9 +495,9 @@ type Scanned<'py> = (
 /// Read the statements of a text in RAPID.
 ///
 /// Returns: the distinct forms; of every statement its form, where it begins and ends, and
-/// from which number and name on those are its own, (n + 1,); where numbers start and end
-/// and what they are worth, (m,); the distinct names and those of the statements, (p,);
-/// where strings and headers begin that do not end.
+/// from which number and name on those are its own, (n + 1,); where numbers stand and what
+/// they are worth, (m,); the distinct names and those of the statements, (p,); where
+/// strings and headers begin that do not end.
 #[pyfunction]
 pub fn scan_statements<'py>(py: Python<'py>, data: &Bound<'py, PyBytes>) -> PyResult<Scanned<'py>> {
     let data = data.as_bytes();
@@ -529,7 +530,7 @@ fn scanned<'py, R: Cutting + Send>(
     let (mut forms, mut names) = (Interned::default(), Interned::default());
     let (mut form, mut begin, mut finish) = (Vec::new(), Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
-    let (mut start, mut end, mut value) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut places, mut value) = (Spans::default(), Vec::new());
     let (mut name, mut open) = (Vec::new(), Vec::new());
     let mut one = Statement::default();
     let mut more = true;
@@ -544,17 +545,27 @@ fn scanned<'py, R: Cutting + Send>(
                 begin.push(one.begin as i32);
                 finish.push(one.end as i32);
                 for (from, to) in &one.numbers {
-                    start.push(*from as i32);
-                    end.push(*to as i32);
+                    places.push(*from, *to);
                     value.push(value_of(&data[*from..*to]));
                 }
                 name.extend(one.names.iter().map(|(from, to)| names.of(&data[*from..*to])));
-                first.push(start.len() as i32);
+                first.push(places.len() as i32);
                 name_first.push(name.len() as i32);
                 open.extend(one.open);
             }
             true
         })?;
+        if more && form.len() == AT_ONCE {
+            // Of all that is still to come at once: what grows by and by leaves holes.
+            let room = |length: usize| length * (data.len() - one.end) / one.end;
+            let statements = room(form.len());
+            for own in [&mut form, &mut begin, &mut finish, &mut first, &mut name_first] {
+                own.reserve(statements);
+            }
+            places.reserve(room(value.len()));
+            value.reserve(room(value.len()));
+            name.reserve(room(name.len()));
+        }
     }
     let texts = forms.texts().map(|text| PyBytes::new(py, text));
     Ok((
@@ -566,7 +577,7 @@ fn scanned<'py, R: Cutting + Send>(
             first.into_pyarray(py),
             name_first.into_pyarray(py),
         ),
-        (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
+        (places.into_arrays(py), value.into_pyarray(py)),
         (NameColumn::of_latin_1(names), name.into_pyarray(py)),
         open,
     ))

@@ -100,7 +100,7 @@ pub fn weave<'py>(
     })
 }
 
-/// Tell whether a text is another one with spans replaced, behind so many bytes.
+/// Tell whether a text, without the bytes of a stamp, is another one with spans replaced.
 #[pyfunction]
 pub fn is_woven<'py>(
     py: Python<'py>,
@@ -109,12 +109,22 @@ pub fn is_woven<'py>(
     end: Ints<'py>,
     new: PyReadonlyArray2<'py, u8>,
     found: &Bound<'py, PyBytes>,
-    skipped: usize,
+    stamp: (usize, usize),
 ) -> PyResult<bool> {
     let edits = Edits::new(data, (&start, &end), &new)?;
-    let mut rest = found.as_bytes().get(skipped..);
-    edits.pass(py, |text| rest = rest.and_then(|rest| rest.strip_prefix(text)))?;
-    Ok(rest.is_some_and(<[u8]>::is_empty))
+    let found = found.as_bytes();
+    let (Some(mut head), Some(mut rest)) = (found.get(..stamp.0), found.get(stamp.1..)) else {
+        return Ok(false);
+    };
+    let mut same = true;
+    edits.pass(py, |text| {
+        let (first, second) = text.split_at(text.len().min(head.len()));
+        same = same && head.starts_with(first) && rest.starts_with(second);
+        if same {
+            (head, rest) = (&head[first.len()..], &rest[second.len()..]);
+        }
+    })?;
+    Ok(same && head.is_empty() && rest.is_empty())
 }
 
 /// Cut spans out of a text, in ascending order: rows filled up with NUL, (m, w).

@@ -17,9 +17,8 @@ from postproc.compensation.sidecar import FileRecord, Sidecar, block_checksums, 
 from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
-from postproc.language.text.number_edits import difference
+from postproc.language.text.number_edits import NO_STAMP, difference
 from postproc.language.text.source import (
-    UTF8_MARK,
     Edit,
     Replacements,
     Source,
@@ -31,7 +30,6 @@ from postproc.language.text.stamp import (
     stamp_line,
     stamp_place,
     stamp_span,
-    strip_stamp,
 )
 from postproc.language.visits import Literals, Visits
 from postproc.motion.deviation import JointDeviation
@@ -88,9 +86,6 @@ class Output:
             if source.name in self.stamps
         }  # fmt: skip
         return Sidecar(__version__, model, records, options)
-
-
-NO_STAMP = Span(0, 0)
 
 
 def write_edits(
@@ -242,13 +237,9 @@ def check_output(
 def _in_texts(before: ParsedProgram, after: ParsedProgram, output: Output) -> str:
     """Say where the texts differ otherwise than by the edits, nothing if nowhere."""
     for old, new, edits in zip(before.texts, after.texts, output.edits, strict=True):
-        name, data = old.source.name, new.source.data
-        stamp = stamp_span(data) if name in output.stamps else Span(0, 0)
-        if stamp.start or old.source.data.startswith(UTF8_MARK):  # a mark is no code
-            text = strip_stamp(data) if name in output.stamps else data
-            problem = difference(old, Source(new.source.name, text), edits)
-        else:
-            problem = difference(old, new, edits, stamp.end)
+        name = old.source.name
+        stamp = stamp_span(new.source.data) if name in output.stamps else NO_STAMP
+        problem = difference(old, new, edits, stamp)
         if problem:
             return f"{name}: {problem}; nothing is written"
     return ""

@@ -12,7 +12,7 @@ from postproc.compensation.rewrite import (
     read_back,
 )
 from postproc.language.text.number_edits import Skeleton, difference
-from postproc.language.text.source import NumberSpans, Replacements, Source, apply
+from postproc.language.text.source import Replacements, Source, Span, apply
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.made import spot
@@ -88,19 +88,37 @@ def test_a_number_elsewhere_is_refused() -> None:
     data = POSES[: start[0]] + b"9.500" + POSES[start[0] + 1 :]
     after = Skeleton.read(Source("a.pdl", data))
     assert difference(before, after, edits) == ""
-    assert difference(before, after, edits, 1)
-    for places in ("start", "end"):
-        moved = {name: getattr(after.numbers, name) for name in ("start", "end")}
-        moved[places][5] += 1
-        wrong = replace(after, numbers=NumberSpans.of(**moved))
+    assert difference(before, after, edits, Span(0, 1))
+    for places in ("offset", "length"):
+        moved = getattr(after.numbers, places).copy()
+        moved[5] += 1
+        wrong = replace(after, numbers=replace(after.numbers, **{places: moved}))
         assert "elsewhere" in difference(before, wrong, edits)
     half = Replacements(start, start, np.array([b"9.5"]))
     after = Skeleton.read(Source("a.pdl", apply(POSES, half)))
     assert "one whole number" in difference(before, after, half)
     none = Replacements(start[:0], start[:0], np.array([], dtype="S1"))
-    fewer = replace(before, numbers=NumberSpans.of(start[:0], start[:0]))
+    fewer = replace(before, numbers=Skeleton.read(Source("a", b"END a")).numbers)
     assert "other lines or numbers" in difference(before, fewer, none)
     assert difference(before, before, none) == ""
+
+
+def test_a_stamp_may_stand_before_any_line() -> None:
+    """Nothing but the stamp is passed over, and what is behind it moves."""
+    before, stamp = Skeleton.read(Source("a.pdl", POSES)), b"-- stamp 1 2\n"
+    start = before.numbers.start[2:9:3]
+    new = np.array([b"9.500", b"-0.25", b"1"])
+    edits = Replacements(start, before.numbers.end[2:9:3], new)
+    edited = apply(POSES, edits)
+    for at in Source("a.pdl", edited).line_starts.tolist():
+        stamped = Source("a.pdl", edited[:at] + stamp + edited[at:])
+        span = Span(at, at + len(stamp))
+        assert difference(before, Skeleton.read(stamped), edits, span) == ""
+        assert difference(before, stamped, edits, Span(at, span.end - 1))
+        unstamped = Skeleton.read(Source("a.pdl", edited))
+        elsewhere = replace(Skeleton.read(stamped), numbers=unstamped.numbers)
+        last = at > unstamped.numbers.start[-1]
+        assert bool(difference(before, elsewhere, edits, span)) != last
 
 
 def test_what_was_parsed_is_not_parsed_again(cell) -> None:

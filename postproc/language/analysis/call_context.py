@@ -65,6 +65,10 @@ class Context:
             found = self._inner[at, kind] = Context(self, at, kind, place)
         return found
 
+    def forget(self) -> None:
+        """Let go of the contexts within: they hold this one, and what is read there."""
+        self._inner.clear()
+
     @property
     def is_round(self) -> bool:
         """Tell whether this is a round of a loop."""

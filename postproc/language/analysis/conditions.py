@@ -109,7 +109,7 @@ class ConditionColumns:
     def frame(self) -> FrameColumns:
         """Return the frames, each of them once."""
         poses = Interned[tuple[Pose, bool]]()
-        index = np.array([_number(poses, c) for c in self._held], np.int64)
+        index = np.array([_number(poses, c) for c in self._held], np.int32)
         tool, base, uframe = index.reshape(-1, 3).T
         return FrameColumns(
             tool=self._spread(tool),
@@ -123,15 +123,15 @@ class ConditionColumns:
     def motion(self, own: VisitMotion) -> MotionColumns:
         """Return how the arm moves."""
         loads = Interned[tuple[float, ...]]([NO_LOAD])
-        care = np.array([c.care for c in self._held], np.int64).reshape(-1, 3)
+        care = np.array([c.care for c in self._held], np.int8).reshape(-1, 3)
         return MotionColumns(
             **{name: slim(column) for name, column in vars(own).items()},
             nearest_turn=self._each(lambda c: c.nearest_turn, bool),
             care=self._spread(care),
             wrist_joint=self._each(lambda c: c.wrist, bool),
-            orientation_law=self._each(lambda c: c.law, np.int64),
+            orientation_law=self._each(lambda c: c.law, np.int8),
             weaves=self._each(lambda c: c.weaves, bool),
-            load=self._each(lambda c: loads[c.load], np.int64),
+            load=self._each(lambda c: loads[c.load], np.int32),
             loads=np.array([*loads], float),
         )
 
@@ -140,8 +140,8 @@ class ConditionColumns:
         return ZoneColumns(
             size_mm=self._each(lambda c: c.zone.size_mm, float),
             overlap_percent=self._each(lambda c: c.zone.overlap_percent, float),
-            blend=self._each(lambda c: c.zone.blend, np.int64),
-            rule=self._each(lambda c: c.zone.rule, np.int64),
+            blend=self._each(lambda c: c.zone.blend, np.int8),
+            rule=self._each(lambda c: c.zone.rule, np.int8),
         )
 
     def speed(self) -> SpeedColumns:

@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from postproc.arrays import Indices
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.text.source import CloneError
@@ -84,14 +87,14 @@ class TaskFile:
         text: Its statements.
         routines: In the order of the file.
         data: Declared data.
-        moves: Rows of statements that move.
+        moves: Rows of statements that move, ascending, (m,).
         diagnostics: What is not understood, by line.
     """
 
     text: StatementText[Any]
     routines: tuple[HeadedRows, ...]
     data: tuple[Datum, ...]
-    moves: tuple[int, ...]
+    moves: Indices
     diagnostics: tuple[Diagnostic, ...]
 
     def find_move(self, line: int) -> int:
@@ -100,10 +103,16 @@ class TaskFile:
         Raises:
             CloneError: There are others, or none.
         """
-        found = [row for row in self.moves if self.text.line(row) == line]
+        rows = np.searchsorted(self.text.begin_line, [line, line + 1])
+        found = self.moves[slice(*np.searchsorted(self.moves, rows).tolist())]
         if len(found) != 1:
             raise CloneError("no single move stands on its line")
-        return found[0]
+        return int(found[0])
+
+    def is_move(self, row: int) -> bool:
+        """Return True if a statement moves."""
+        at = np.searchsorted(self.moves, row)
+        return bool(at < len(self.moves) and self.moves[at] == row)
 
     @property
     def is_system(self) -> bool:

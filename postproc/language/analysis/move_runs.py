@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Indices, Ints, chunks
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.text.statement_table import StatementText
 
@@ -44,9 +44,11 @@ def find_runs(
             continue
         start, end = int(text.first[first]), int(text.first[behind])
         numbers = text.value[start:end].reshape(behind - first, -1)
-        others = np.delete(numbers, places, axis=1)
-        own = plain(numbers[:, places])
-        same = own[1:] & own[:-1] & (others[1:] == others[:-1]).all(axis=1)
+        rows = chunks(len(numbers))
+        own = np.concatenate([plain(numbers[k][:, places]) for k in rows])
+        same = own[1:] & own[:-1]
+        for column in {*range(numbers.shape[1])}.difference(places):
+            same &= numbers[1:, column] == numbers[:-1, column]
         cuts = [0, *(np.flatnonzero(~same) + 1).tolist(), len(numbers)]
         for a, b in pairwise(cuts):
             if b - a >= LEAST:
@@ -85,11 +87,12 @@ def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
     return set(np.flatnonzero(found).tolist())
 
 
-def within(counts: Ints) -> tuple[Ints, Ints]:
+def within(counts: Ints) -> tuple[Indices, Indices]:
     """Return of each of all that are counted: whose it is, and its place there.
 
     >>> within(np.array([1, 3]))
     (array([0, 1, 1, 1]), array([0, 0, 1, 2]))
     """
-    owner = np.repeat(np.arange(len(counts)), counts)
-    return owner, np.arange(len(owner)) - (np.cumsum(counts) - counts)[owner]
+    owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    begin = (np.cumsum(counts) - counts).astype(np.int32)
+    return owner, np.arange(len(owner), dtype=np.int32) - begin[owner]

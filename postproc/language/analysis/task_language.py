@@ -14,7 +14,6 @@ from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.language import JobReading, Language
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import Source
 from postproc.language.visits import Diagnostic, Visits, never_reached
 
 
@@ -32,14 +31,6 @@ class TaskLanguage(Language):
     begins: ClassVar[re.Pattern[bytes]]
     joints: ClassVar[re.Pattern[str]]
 
-    def read_file(self, source: Source) -> TaskFile:
-        """Read a file.
-
-        Raises:
-            ProgramError: It is no text of this language.
-        """
-        raise NotImplementedError
-
     def recognises(self, text: bytes) -> bool:
         """Return True if a program begins there, behind comments and a header."""
         return self.begins.match(text) is not None
@@ -51,10 +42,6 @@ class TaskLanguage(Language):
     def prepare(self) -> None:
         """Load the parser of statements."""
         line_parser(self.grammar, "statement")
-
-    def skeleton(self, file: TaskFile) -> Skeleton:
-        """Take over what statements tell, for comparing a text with another."""
-        return Skeleton.of(file.text, lambda one: self.skeleton(self.read_file(one)))
 
     def report(
         self, machine: TaskMachine, visits: Visits, files: Sequence[Any],
@@ -70,11 +57,12 @@ class TaskLanguage(Language):
             main: What runs first, and what a file is called.
         """
         missed = machine.find_unreached()
+        machine.root.forget()
         told = never_reached(missed, *main)
         found = {*odd, *machine.diagnostics, *told}
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
-        texts = tuple(map(self.skeleton, files))
+        texts = tuple(Skeleton.of(file.text) for file in files)
         return JobReading(texts, visits, tuple(sorted(found)), kept, missed)
 
 

@@ -137,7 +137,7 @@ class TaskMachine(Interpreter[Arrived]):
         visits: Arrivals by number.
         keys: Context, row and number within the row of each.
         diagnostics: What else was found.
-        reached: Moves that some way leads to: file and row.
+        reached: Which statements of each file are moves that some way leads to.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
         at_once: Moves that differ only in where they go are read at once.
@@ -154,7 +154,7 @@ class TaskMachine(Interpreter[Arrived]):
     visits: list[Any] = field(default_factory=list)
     keys: list[tuple[Context, int, int]] = field(default_factory=list)
     diagnostics: set[Diagnostic] = field(default_factory=set)
-    reached: set[tuple[int, int]] = field(default_factory=set)
+    reached: list[Bools] = field(init=False)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
     paused: set[int] = field(default_factory=set)
@@ -168,6 +168,9 @@ class TaskMachine(Interpreter[Arrived]):
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.reached = [np.zeros(len(text), dtype=bool) for text in self.texts]
 
     # What a language says.
 
@@ -326,7 +329,7 @@ class TaskMachine(Interpreter[Arrived]):
         (number,) = self._numbers[context, row]
         self.visits[number].count = behind - row
         file = context.place.scope.file
-        self.reached |= {(file, k) for k in range(row, behind)}
+        self.reached[file][row:behind] = True
         return behind, after
 
     def before(
@@ -395,7 +398,7 @@ class TaskMachine(Interpreter[Arrived]):
         key = place.scope.file, place.flow.first
         if key not in self._runs:
             text = place.text
-            apart |= rows_of_lines(text, self.task.comments.list_taught(text.source))
+            apart |= rows_of_lines(text, self.task.taught_lines[place.scope.file])
             self._runs[key] = find_runs(
                 text, place.flow, apart, self.places_of, self.is_plain
             )
@@ -556,7 +559,7 @@ class TaskMachine(Interpreter[Arrived]):
             one: .. and what it says.
             here: How the arm comes to it.
         """
-        self.reached.add((context.place.scope.file, row))
+        self.reached[context.place.scope.file][row] = True
         known = self._numbers.get((context, row))
         if known is None:
             found = [*self.read_visits(one, row, context.place.scope, here)]
@@ -770,12 +773,10 @@ class TaskMachine(Interpreter[Arrived]):
         for number, file in enumerate(self.task.files):
             if file.is_system:
                 continue
-            text, rows = file.text, file.moves
-            lines = {
-                text.line(row) for row in rows if (number, row) not in self.reached
-            }
-            if lines:
-                found[text.source.name] = np.array(sorted(lines), dtype=np.int64)
+            text, missed = file.text, file.moves[~self.reached[number][file.moves]]
+            if len(missed):
+                lines = np.unique(text.begin_line[missed]).astype(np.int64)
+                found[text.source.name] = lines
         return found
 
 

@@ -122,6 +122,7 @@ def visits_of(
     columns.taught = np.array(_find_taught(found, machine), bool)[runs.owner]
     columns.measured = _read_measure_ids(found, machine)
     literals, literal = find_literals(columns, numbering)
+    columns.slots = columns.slots[:0].copy()  # the others need the room
     own = np.append(literal[runs.begin[written.example]], -1)  # each one's first
     other = [*_goals_beside(machine)]
     pinned = _find_pinned(found, written, other, machine.task.uses.copies)
@@ -150,8 +151,8 @@ class _Runs:
 
     counts: Ints
     begin: Ints
-    owner: Ints
-    inside: Ints
+    owner: Indices
+    inside: Indices
 
     @classmethod
     def of(cls, found: Sequence[FoundVisit]) -> _Runs:
@@ -196,15 +197,15 @@ def _fill(
     n, owner = len(runs.owner), runs.owner
     c = VisitColumns(n, width, aux.shape[1], len(numbering))
     c.file[:] = np.array([v.scope.file for v in found], np.int64)[owner]
-    row = np.array([v.row for v in found], np.int64)[owner] + runs.inside
+    row = np.array([v.row for v in found], np.int32)[owner] + runs.inside
     for number, text in enumerate(machine.texts):
         mine = c.file == number
-        c.line[mine] = text.source.lines_of(text.begin[row[mine]])
+        c.line[mine] = text.begin_line[row[mine]]
     c.motion[:] = np.array([v.motion for v in found], np.int64)[owner]
     c.target[:] = np.array([v.goal.target for v in found], np.int64)[owner]
     c.via[:] = np.array([v.via for v in found], bool)[owner]
     c.arc_angle = np.array([v.arc_angle for v in found], float)[owner]
-    c.block = np.append(runs.begin, -1)[_blocks(found)][owner]
+    c.block = np.append(runs.begin, -1)[_blocks(found)].astype(np.int32)[owner]
     c.curved = np.array([v.curved for v in found], bool)[owner]
     c.aux[:] = aux[owner]
     c.name[:] = c.names.of([v.goal.name for v in found])[owner]
@@ -239,9 +240,11 @@ def _fill_numbers(
             continue
         text = machine.texts[file]
         stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
-        places = own[is_written] + stride * np.arange(v.count)[:, None]
-        columns.slots[rows, is_written] = places + base
-        columns.values[rows, is_written] = text.value[places]
+        steps = stride * np.arange(v.count)
+        for column in np.flatnonzero(is_written).tolist():  # one by one: short of room
+            places = own[column] + steps
+            columns.slots[rows, column] = places + base
+            columns.values[rows, column] = text.value[places]
 
 
 def _fill_conditions(
@@ -273,11 +276,12 @@ def _read_measure_ids(
     ids: dict[tuple[int, int], str] = {}
     for number, file in enumerate(machine.task.files):
         text, rows = file.text, file.moves
-        last = text.source.lines_of(text.end[np.asarray(rows, np.int64)])
-        for line, mark in machine.task.comments.marks(text.source, MEASURE):
+        marks = [*machine.task.comments.marks(text.source, MEASURE)]
+        last = text.source.lines_of(text.end[rows]) if marks else rows
+        for line, mark in marks:
             at = int(np.searchsorted(last, line))
             if at < len(rows):
-                ids.setdefault((number, rows[at]), mark)
+                ids.setdefault((number, int(rows[at])), mark)
     if not ids:
         return {}
     each = ((v, k) for v in found for k in range(v.count))
@@ -436,9 +440,10 @@ def _hold_for_taught(
 
 def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
     """Yield where moves go that run in ways that are not followed, and say so."""
-    files = enumerate(machine.task.files)
-    moves = {(number, row) for number, file in files for row in file.moves}
-    for file, row in sorted(moves.intersection(machine.rows_beside())):
+    files = machine.task.files  # and no others: of those beside the task nothing moves
+    for file, row in sorted({*machine.rows_beside()}):
+        if file >= len(files) or not files[file].is_move(row):
+            continue
         text = machine.texts[file]
         why = BESIDE.format(text.line(row), text.source.name)
         for goal in machine.goals_of(file, row):

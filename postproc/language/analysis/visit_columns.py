@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -258,8 +258,7 @@ def find_literals(
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
     span = len(rows) > 0 and rows[-1] - rows[0] == len(rows) - 1  # a view, no copy
     slots = columns.slots[rows[0] : rows[-1] + 1] if span else columns.slots[rows]
-    numbers = slots.ravel()
-    if bool((numbers[1:] > numbers[:-1]).all()) and not numbering.apart(slots).any():
+    if _ascend(slots) and not numbering.apart(slots).any():
         literal[rows] = np.arange(len(rows), dtype=np.int32)
         return _literals(columns, numbering, slots, rows, literal), literal
     _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
@@ -279,6 +278,18 @@ def find_literals(
     first = rows[example[kept]]
     _mark_torn(columns, numbering, literal)
     return _literals(columns, numbering, distinct[kept], first, literal), literal
+
+
+def _ascend(slots: Indices) -> bool:
+    """Tell whether each number stands behind the one before, in a target and of all.
+
+    Those that are not written are the last of a target.
+    """
+    pairs = pairwise(slots.T)
+    if not all(((b < 0) | ((a >= 0) & (a < b))).all() for a, b in pairs):
+        return False
+    last = np.maximum.reduce([*slots.T])
+    return bool((last[:-1] < slots[1:, 0]).all())
 
 
 def _mark_torn(columns: VisitColumns, numbering: Numbering, literal: Indices) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
@@ -83,7 +84,7 @@ class KrlFileName(FileName):
         if not self.is_program:
             return {}, {}
         found = {KrlFileName(self.data_list).key: 1}
-        for call in _CALLED.finditer(text):
+        for call in _find_calls(text):
             called = f"{call[1].decode('latin-1').lower()}{self.programs[0]}"
             if called not in found:
                 found[called] = text.count(b"\n", 0, call.start()) + 1
@@ -117,6 +118,16 @@ class KrlFileName(FileName):
 
 
 FILES = KrlFileName
+
+
+def _find_calls(text: bytes) -> Iterator[re.Match[bytes]]:
+    """Yield what may be calls; only lines with a bracket are looked at."""
+    at = text.find(b"(")
+    while at >= 0:
+        end = text.find(b"\n", at)
+        end = len(text) if end < 0 else end
+        yield from _CALLED.finditer(text, text.rfind(b"\n", 0, at) + 1, end)
+        at = text.find(b"(", end)
 
 
 def _find_shared_list(

@@ -103,7 +103,7 @@ class KrlSplitter(Splitter):
         """Return moves with triggers, and those beside them; None for all moves."""
         found = set[_Row]()
         for number, file in enumerate(self.files):
-            moves, text = file.moves, file.text
+            moves, text = file.moves.tolist(), file.text
             for row in text.where(lambda one: isinstance(one, said.PathTrigger)):
                 at = bisect(moves, row)
                 if at == len(moves) or not all(

@@ -68,10 +68,6 @@ class Krl(TaskLanguage):
     )
     names_numbers = True
 
-    def read_file(self, source: Source) -> KrlFile:
-        """Read a source, a data list or a submit program."""
-        return read_krl(source)
-
     def read(
         self,
         sources: Sequence[Source],

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
@@ -177,14 +180,15 @@ class KrlGoals:
     def block(self, row: int, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
-        return next((rows for rows in blocks if row in rows), None)
+        at = bisect_right(blocks, row, key=lambda rows: rows.start) - 1
+        return blocks[at] if at >= 0 and row in blocks[at] else None
 
     def _in_block(
         self, move: said.KrlMove, row: int, here: Scope, rows: range
     ) -> tuple[said.KrlMove, dict[str, Any]]:
         """Blend the last move of a block as its end says; say what visits share."""
         file = self.task.files[here.file]
-        inner = row != max(other for other in file.moves if other in rows)
+        inner = row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
         end = file.text.statement(rows.stop)
         if isinstance(end, said.SplineBlock) and not inner:
             move = replace(move, words=(*move.words, *end.words))

@@ -97,12 +97,12 @@ def read_krl(source: Source) -> KrlFile:
     if routines:  # other files know the first one of a file
         head = replace(routines[0].head, local=False)
         routines[0] = replace(routines[0], head=head)
-    moves = text.where(lambda one: isinstance(one, said.KrlMove))
+    moves = text.find_rows(lambda one: isinstance(one, said.KrlMove))
     return KrlFile(
         text,
         tuple(routines),
         tuple(outline.data),
-        tuple(moves),
+        moves,
         tuple(sorted({*outline.diagnostics})),
         name,
         tuple(splines),

@@ -540,7 +540,9 @@ def resolve(
     _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
-    return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+    visits = collect(machine)
+    machine.root.forget()
+    return Resolved(visits, tuple(sorted(world.diagnostics)))
 
 
 def _keep_exported(world: World, machine: Machine) -> None:

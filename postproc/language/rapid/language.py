@@ -57,10 +57,6 @@ class Rapid(TaskLanguage):
     )
     goes_on = True
 
-    def read_file(self, source: Source) -> RapidFile:
-        """Read a module."""
-        return read_rapid(source)
-
     def read(
         self,
         sources: Sequence[Source],

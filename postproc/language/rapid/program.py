@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from postproc import _native
 from postproc.diagnostics import Code
 from postproc.language import ir
@@ -92,8 +94,9 @@ def read_rapid(source: Source) -> RapidFile:
     # Without its end, calls may stand behind a record.
     ended = (r for r in outline.of("record") if r.ended)
     within = {row for r in ended for row in range(r.first, r.last + 1)}
-    moves = [row for row in text.where(is_move) if row not in within]
-    for row in (row for row in moves if _lacks_position(text.statement(row))):
+    moves = text.find_rows(is_move)
+    moves = moves[~np.isin(moves, sorted(within))] if within else moves
+    for row in (row for row in text.where(_lacks_position) if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
     for row in (row for row in text.where(holds_odd) if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
@@ -101,7 +104,7 @@ def read_rapid(source: Source) -> RapidFile:
         text,
         tuple(outline.of(*_ROUTINES)),
         tuple(outline.data),
-        tuple(moves),
+        moves,
         tuple(sorted({*outline.diagnostics})),
         tuple(outline.of("module")),
     )
@@ -121,8 +124,9 @@ def is_move(one: ir.SourceStatement) -> bool:
 
 
 def _lacks_position(one: ir.SourceStatement) -> bool:
-    """Return True if a move says no destination, or no point of an arc."""
+    """Return True for a move that says no destination, or no point of an arc."""
     one = inside(one)
-    assert isinstance(one, ir.Instruction)
+    if not (isinstance(one, ir.Instruction) and is_move(one)):
+        return False
     to, via = MOTIONS[one.name].operands(one.arguments)
     return to is None or (MOTIONS[one.name].via >= 0 and via is None)

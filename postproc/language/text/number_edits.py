@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from postproc.language.text.source import (
     NumberSpans,
     Replacements,
     Source,
+    Span,
     apply,
     as_texts,
 )
@@ -28,6 +29,7 @@ from postproc.language.visits import Literals
 # What new numbers must leave alone: the shapes of lines and where numbers stand.
 
 AT_ONCE = 200_000  # numbers compared: what that takes is small beside two texts
+NO_STAMP = Span(0, 0)
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,6 @@ class Skeleton:
         shape: Index into `shapes`, (n,).
         line: 1-based physical lines, (n,).
         numbers: Where the numbers stand, (m,).
-        reread: Reads another text of the same language.
     """
 
     source: Source
@@ -50,17 +51,12 @@ class Skeleton:
     shape: Indices
     line: Indices
     numbers: NumberSpans
-    reread: Callable[[Source], Skeleton] | None = None
 
     @classmethod
-    def of(
-        cls,
-        text: Statements[Any],
-        reread: Callable[[Source], Skeleton] | None = None,
-    ) -> Skeleton:
+    def of(cls, text: Statements[Any]) -> Skeleton:
         """Take over what the statements of a text tell."""
         where = text.shape, text.begin_line, text.numbers
-        return cls(text.source, text.shapes, *where, reread)
+        return cls(text.source, text.shapes, *where)
 
     @classmethod
     def read(cls, source: Source) -> Skeleton:
@@ -76,7 +72,7 @@ def difference(
     before: Source | Skeleton,
     after: Source | Skeleton,
     allowed: Replacements,
-    stamp: int = 0,
+    stamp: Span = NO_STAMP,
 ) -> str:
     """Say where a text differs from its origin otherwise than by the edits meant.
 
@@ -88,7 +84,7 @@ def difference(
         before: The original; it is read where it has not been yet.
         after: The rewritten text, likewise.
         allowed: The edits of numbers that were meant.
-        stamp: Bytes of the stamp line that the rewritten text begins with.
+        stamp: Where the stamp line stands in the rewritten text.
 
     Returns:
         What is wrong, "" where all is well.
@@ -96,14 +92,15 @@ def difference(
     old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
     if not allowed.reproduces(old.data, new.data, stamp):
         meant = apply(old.data, allowed)
-        length = min(len(meant), len(new.data) - stamp)
-        pairs = zip(meant, new.data[stamp:], strict=False)
+        text = new.data[: stamp.start] + new.data[stamp.end :]
+        pairs, length = zip(meant, text, strict=False), min(len(meant), len(text))
         at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
-        line = new.line_of(min(at + stamp, max(len(new.data) - 1, 0)))
+        at += (stamp.end - stamp.start) * (at >= stamp.start)
+        line = new.line_of(min(at, max(len(new.data) - 1, 0)))
         return f"line {line}: the text is not what was meant"
     try:
-        a = before if isinstance(before, Skeleton) else Skeleton.read(before)
-        b = after if isinstance(after, Skeleton) else (a.reread or Skeleton.read)(after)
+        a, b = (s if isinstance(s, Skeleton) else Skeleton.read(s)
+                for s in (before, after))  # fmt: skip
     except ProgramError as problem:
         return str(problem)
     if len(a.shape) != len(b.shape) or len(a.numbers) != len(b.numbers):
@@ -111,40 +108,42 @@ def difference(
     if a.shapes != b.shapes or (a.shape != b.shape).any():
         row = int(np.flatnonzero(a.shape != b.shape)[:1].sum())
         return f"line {a.line[row]}: the rewritten line has another shape"
-    return _part_of_a_number(a, allowed) or _number_elsewhere(a, b, allowed, stamp)
+    return _number_elsewhere(a, b, allowed, stamp)
 
 
-def _part_of_a_number(before: Skeleton, allowed: Replacements) -> str:
-    """Say which edit does not replace one whole number."""
-    done, wrong = 0, np.empty(0, dtype=np.int32)
+def _number_elsewhere(
+    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: Span
+) -> str:
+    """Say which edit does not replace one whole number, or which number moves wrongly.
+
+    Numbers must stand where the edits of those before them, and the stamp, move them.
+    """
+    done, shift, length = 0, np.int32(0), np.int32(stamp.end - stamp.start)
     for rows in chunks(len(before.numbers), AT_ONCE):
         start, end = before.numbers.starts(rows), before.numbers.ends(rows)
         some = allowed[done : np.searchsorted(allowed.start, start[-1], side="right")]
         at = np.searchsorted(start, some.start)
-        whole = (start[at] == some.start) & (end[at] == some.end)
-        wrong, done = np.append(wrong, some.start[~whole]), done + len(some)
-    wrong = np.append(wrong, allowed.start[done:])
-    if not len(wrong):
-        return ""
-    line = before.source.line_of(int(wrong[0]))
-    return f"line {line}: an edit does not replace one whole number"
-
-
-def _number_elsewhere(
-    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
-) -> str:
-    """Say which number does not stand where the edits move it to."""
-    shift = stamp + np.cumsum(np.append(np.int32(0), allowed.growth), dtype=np.int32)
-    for rows in chunks(len(before.numbers), AT_ONCE):
-        start, end = before.numbers.starts(rows), before.numbers.ends(rows)
-        edits = np.searchsorted(allowed.start, start)  # before the number
-        wrong = after.numbers.starts(rows) != start + shift[edits]
-        edits = np.searchsorted(allowed.start, start, side="right")  # and its own
-        wrong |= after.numbers.ends(rows) != end + shift[edits]
+        part = (start[at] != some.start) | (end[at] != some.end)
+        if part.any():
+            return _part_of_a_number(before, int(some.start[part][0]))
+        growth = np.zeros(len(start), dtype=np.int32)
+        growth[at] = some.growth
+        moved = shift + np.cumsum(growth, dtype=np.int32)
+        behind = length * (start + moved - growth >= stamp.start)
+        wrong = after.numbers.starts(rows) != start + moved - growth + behind
+        wrong |= after.numbers.ends(rows) != end + moved + behind
         if wrong.any():
             line = before.source.line_of(int(start[wrong][0]))
             return f"line {line}: a number stands elsewhere than it should"
+        done, shift = done + len(some), moved[-1]
+    if done < len(allowed):
+        return _part_of_a_number(before, int(allowed.start[done]))
     return ""
+
+
+def _part_of_a_number(before: Skeleton, place: int) -> str:
+    line = before.source.line_of(place)
+    return f"line {line}: an edit does not replace one whole number"
 
 
 # The edits, file by file.

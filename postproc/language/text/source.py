@@ -124,18 +124,20 @@ class Replacements(Sequence[Edit]):
         """
         return _native.weave(data, *self._columns())
 
-    def reproduces(self, data: bytes, found: bytes, behind: int = 0) -> bool:
+    def reproduces(
+        self, data: bytes, found: bytes, stamp: tuple[int, int] = (0, 0)
+    ) -> bool:
         """Tell whether a text is what comes of these edits of another, to the byte.
 
         Args:
             data: The text before.
             found: The text in question.
-            behind: Bytes of it that stand before the result.
+            stamp: Bytes of it that are not looked at: where they begin and end.
 
         Raises:
             ValueError: An edit lies outside.
         """
-        return _native.is_woven(data, *self._columns(), found, behind)
+        return _native.is_woven(data, *self._columns(), found, stamp)
 
     def _columns(self) -> tuple[Indices, Indices, Bytes]:
         """Return the edits as the core takes them."""
@@ -192,16 +194,6 @@ class NumberSpans:
     base: Indices
     offset: NDArray[np.unsignedinteger[Any]]
     length: NDArray[np.unsignedinteger[Any]]
-
-    @classmethod
-    def of(cls, start: Indices, end: Indices) -> NumberSpans:
-        """Take the byte offsets at which numbers begin and end, (m,).
-
-        >>> NumberSpans.of(np.array([3, 70]), np.array([5, 71])).start.tolist()
-        [3, 70]
-        """
-        ends = start.astype(np.int32, copy=False), end.astype(np.int32, copy=False)
-        return cls(*_native.number_spans(*ends))
 
     def __len__(self) -> int:
         """Return how many numbers there are."""

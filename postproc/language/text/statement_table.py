@@ -9,7 +9,7 @@ from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices
+from postproc.arrays import Bools, Floats, Indices, release_memory
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language.text.source import NumberSpans, Source, Span
@@ -17,6 +17,7 @@ from postproc.language.text.templates import (
     ParsedShapes,
     Shapes,
     find_shapes,
+    number_in_order,
     parse_shapes,
 )
 from postproc.language.visits import Diagnostic
@@ -66,19 +67,27 @@ class Statements(Generic[T]):
         found: Bools = self.said.which(test)[self.shape]
         return found
 
-    def where(
+    def find_rows(
         self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
-    ) -> list[int]:
-        """List statements that pass a test, which is asked once for each shape.
+    ) -> Indices:
+        """Return statements that pass a test, which is asked once for each shape.
 
         Args:
             test: The test.
             first: The first row to look at.
             behind: The row behind the last one.
         """
-        shapes, own = np.unique(self.shape[first:behind], return_inverse=True)
-        passed = np.array([test(self.said[k]) for k in shapes.tolist()], dtype=bool)
-        rows: list[int] = (first + np.flatnonzero(passed[own])).tolist()
+        shape = self.shape[first:behind]
+        number, example = number_in_order(shape)
+        passed = [test(self.said[k]) for k in shape[example].tolist()]
+        rows = first + np.flatnonzero(np.array(passed, dtype=bool)[number])
+        return rows.astype(np.int32)
+
+    def where(
+        self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
+    ) -> list[int]:
+        """List statements that pass a test, as `find_rows`."""
+        rows: list[int] = self.find_rows(test, first, behind).tolist()
         return rows
 
     def line(self, row: int) -> int:
@@ -169,10 +178,11 @@ def read_text(
     at_names = np.asarray(name_first[:-1])
     shapes, shape = find_shapes(forms, form, at_names, names[1], names[0])
     said = parse_shapes(shapes, parse)
-    start, stop, value = numbers
-    value = np.where(np.isfinite(value), value, np.nan)
-    line, places = source.lines_of(begin), NumberSpans.of(start, stop)
+    places, value = numbers
+    value[~np.isfinite(value)] = np.nan
+    line = source.lines_of(begin).astype(np.int32)
+    release_memory(len(value))
     return StatementText(
-        source, said, shape.astype(np.int32), line.astype(np.int32), first, places,
-        value, begin, end,
+        source, said, shape.astype(np.int32), line, first, NumberSpans(*places), value,
+        begin, end,
     )  # fmt: skip

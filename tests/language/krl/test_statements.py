@@ -12,9 +12,8 @@ from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.krl import syntax as said
-from postproc.language.krl.language import Krl
 from postproc.language.krl.program import read_krl
-from postproc.language.text.source import Source
+from postproc.language.text.source import NumberSpans, Source
 from tests.reference.krl_lines import krl_lines
 
 PIECES = st.sampled_from([
@@ -40,7 +39,8 @@ def scanned(data):
     """Return what the core reads, statement by statement."""
     forms, by_statement, numbers, (names, name), opened = _native.scan_krl(data)
     form, begin, end, first, name_first = by_statement
-    places = list(zip(*(column.tolist() for column in numbers[:2]), strict=True))
+    where = NumberSpans(*numbers[0])
+    places = list(zip(where.start.tolist(), where.end.tolist(), strict=True))
     found = []
     for k in range(len(form)):
         own = name[name_first[k] : name_first[k + 1]]
@@ -159,8 +159,8 @@ def test_programs_of_others_are_read_without_loss():
             for line in between.replace("\r", "\n").split("\n"):
                 assert not line.partition(";")[0].strip()
             at = span.end
-        again = Krl().skeleton(read_krl(Source(path.name, bytes(source.data))))
-        assert again.shapes == Krl().skeleton(file).shapes
+        again = read_krl(Source(path.name, bytes(source.data)))
+        assert again.text.shapes == file.text.shapes
 
 
 @pytest.mark.parametrize(

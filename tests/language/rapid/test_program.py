@@ -169,7 +169,7 @@ def test_a_milling_job_has_one_shape():
     file = read_rapid(
         Source("m.mod", f"MODULE m\r\nPROC a()\r\n{moves}ENDPROC\r\nENDMODULE".encode())
     )
-    assert file.moves == tuple(range(2, 3002))
+    assert file.moves.tolist() == [*range(2, 3002)]
     assert len(file.text.said.shapes.texts) == 5 and not file.diagnostics
 
 

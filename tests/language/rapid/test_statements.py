@@ -11,7 +11,7 @@ from postproc.language import ir
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.parser import parse_statement
 from postproc.language.rapid.program import read_statements
-from postproc.language.text.source import Source
+from postproc.language.text.source import NumberSpans, Source
 from tests.reference.statements import BEGINNING, statements
 
 PIECES = st.sampled_from([
@@ -29,7 +29,8 @@ def scanned(data):
     """Return what the core reads, statement by statement."""
     forms, by_statement, numbers, (names, name), opened = _native.scan_statements(data)
     form, begin, end, first, name_first = by_statement
-    places = list(zip(*(column.tolist() for column in numbers[:2]), strict=True))
+    where = NumberSpans(*numbers[0])
+    places = list(zip(where.start.tolist(), where.end.tolist(), strict=True))
     found = []
     for k in range(len(form)):
         own = name[name_first[k] : name_first[k + 1]]

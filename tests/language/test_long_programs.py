@@ -1,0 +1,94 @@
+"""A move more costs a row of columns: no call, no object of its own."""
+
+import gc
+import re
+import sys
+import tracemalloc
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from postproc.compensation.program import read_program
+from postproc.language.krl import files as krl_files
+from postproc.language.text.statement_table import StatementText
+from tests.bench.languages import lengthened, milled, written
+from tests.language.neutral_job import LANGUAGES
+
+ONCE, MORE = 4_000, 9  # moves, and times
+CALLS = 0.2  # of functions, for a move; longer columns are cut into more chunks
+BYTES = {"job.pdl": 320, "job.mod": 380, "job.src": 320}  # at once, for a move
+
+
+@pytest.fixture(scope="module")
+def jobs(bench_cell):
+    """Return programs of so many moves, and of many times as many, by their names."""
+    texts = written(milled(bench_cell, ONCE))
+    return {
+        name: [own, {**own, name: lengthened(own[name], MORE)}]
+        for name, own in texts.items()
+    }
+
+
+def calls_of(work):
+    """Count the functions that are called."""
+    count = 0
+
+    def note(_frame, event, _what):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def peak_of(work):
+    """Return the most bytes that are held at once."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_a_move_more_is_a_row_more(name, jobs, bench_cell):
+    moves = (MORE - 1) * ONCE
+    read_program(jobs[name][0], bench_cell)  # what is loaded once
+    for measure, most in ((calls_of, CALLS), (peak_of, BYTES[name])):
+        few, many = (
+            measure(lambda files=files: read_program(files, bench_cell))
+            for files in jobs[name]
+        )
+        print(name, measure.__name__, (many - few) / moves)
+        assert (many - few) / moves < most
+
+
+@pytest.mark.parametrize("name", ["job.mod", "job.src"])
+def test_what_was_read_is_let_go_of(name, jobs, bench_cell):
+    """Nothing waits for the collector of garbage, which comes late."""
+    gc.collect()
+    gc.disable()
+    try:
+        reading = read_program(jobs[name][0], bench_cell)
+        held = [one for one in gc.get_objects() if isinstance(one, StatementText)]
+        assert reading.visits and name not in {one.source.name for one in held}
+    finally:
+        gc.enable()
+
+
+@given(st.lists(st.sampled_from([
+    "\n", "\r", "\r\n", " ", "\t", "(", ")", "a", "weld", "DO", "global ", "EXT ",
+    "EXT", "GLOBAL\t", ";", "=", "\xe4", "  p1(", "do x(",
+])).map("".join))  # fmt: skip
+def test_calls_are_found_in_lines_with_brackets(text):
+    data = text.encode("latin-1")
+    wanted = [(one.span(), one[1]) for one in krl_files._CALLED.finditer(data)]
+    found = [(one.span(), one[1]) for one in krl_files._find_calls(data)]
+    assert found == wanted
+    assert all(re.search(rb"\(\Z", data[a:b]) for (a, b), _ in found)
