@@ -61,13 +61,14 @@ from postproc.compensation.windowing import Window, cut_points, seams, windows
 from postproc.compensation.workers import in_processes
 from postproc.diagnostics import NO_REASON
 from postproc.language.text.source import Replacements
-from postproc.language.visits import Visits
+from postproc.language.visits import Graph, Visits
 from postproc.model.model import Model
 from postproc.motion.joint_path import StartState
 from postproc.robot.cell import Cell
 from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.pose import MM
 from postproc.robot.state import States
+from postproc.robot.trajectory import Motion
 
 if TYPE_CHECKING:
     from postproc.compensation.rewrite import Output
@@ -389,6 +390,8 @@ class _WindowWork:
             own = cuts.window(self.quiet, own.first, own.end, cuts.RUN_UP)
         visits = own.of(self.reading.visits, known=before is not None)
         lead, arrived, doubtful = _lead(own, before)
+        if before is None and own.begin:
+            lead = replace(lead, begin=self._foretell(own.begin))
         trail, after = self._trail(own, pace), self._after(own)
         setting = self.setting.with_clock(clock)
         aims = self.reading.aims[own.begin : own.stop]
@@ -407,6 +410,20 @@ class _WindowWork:
             arrivals=deepcopy(planned.plan.lead(rows)),
             doubtful=int(planned.doubtful[at : at + 1].max(initial=0)),
         )
+
+    def _foretell(self, visit: int) -> StartState:
+        """Guess where the arm stands at a visit: on the branch of the last joint move.
+
+        Lines do not say on which branch they are, in some languages. A wrong guess is
+        found out where windows are joined.
+        """
+        visits = self.reading.visits
+        tells = visits.motion.kind[:visit] == Motion.JOINT
+        rows = np.append(np.flatnonzero(tells)[-1:], visit)
+        steps = np.arange(len(rows))
+        taken = visits.take(rows, Graph(np.append(steps, len(rows)), steps - 1))
+        alone = taken.with_columns(block=np.full(len(rows), -1))
+        return plan_visits(alone, self.setting.cell, False).plan.exact.at(steps[-1])
 
     def _after(self, own: Window) -> int:
         """Return where the window behind one begins."""

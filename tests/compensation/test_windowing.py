@@ -15,11 +15,13 @@ import pytest
 from postproc.compensation import pipeline
 from postproc.compensation import windowing as cuts
 from postproc.compensation.compensate import compensate
+from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
 from postproc.compensation.outcome import Outcome, Status
-from postproc.compensation.program import read_program
+from postproc.compensation.program import plan_visits, read_program
 from postproc.model.model import Model
 from postproc.report.json import report_text
 from tests.bench import made
+from tests.bench.languages import milled, written
 from tests.slow import slow
 
 LEAST, HALO, BAND, RUN_UP = 90, 80, 24, 200
@@ -236,3 +238,19 @@ def test_what_was_looked_at_last_is_what_is_read_from_the_output(
     outcome = job(made.drilling(400))
     again = read_program(dict(outcome.outputs), bench_cell).visits
     np.testing.assert_array_equal(again.target.values, outcome.decisions.corrected)
+
+
+def test_where_a_window_begins_is_foretold_though_lines_tell_no_branch(
+    bench_cell, bench_model
+):
+    texts = written(milled(bench_cell, 300))["job.src"]
+    reading = read_program(texts, bench_cell)
+    setting = Job(bench_cell, bench_model, DEFAULT_OPTIONS, Clock(no_progress), 1)
+    quiet = np.ones(len(reading.visits), dtype=bool)
+    work = pipeline._WindowWork(reading, setting, quiet, quiet)
+    whole = plan_visits(reading.visits, bench_cell, False).plan.exact
+    for visit in (120, 250):
+        found = work._foretell(visit)
+        assert found.slot == whole.slot[visit] >= 0
+        np.testing.assert_allclose(found.q[0], whole.q[visit], rtol=0, atol=1e-9)
+    assert len(reading.visits) > 250
