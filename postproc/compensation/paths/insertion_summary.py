@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.compensation.paths.arcs import halves
-from postproc.compensation.paths.insertion_prediction import PathPrediction, of_source
+from postproc.compensation.paths.gathered import take_visits
+from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import BEGINS, compare
@@ -39,7 +40,7 @@ def summarize(now: PathPrediction) -> CompensatedProgram:
     in_time = replace(
         now.in_time, before=now.task.first.before, inserted=_report_insertions(now)
     )
-    kept = of_source(now.program.kept, now.own)
+    kept = take_visits(now.program.kept, now.own)
     return replace(now.program, kept=kept, in_time=in_time)
 
 

@@ -54,9 +54,9 @@ def judge(now: PathPrediction) -> PathPrediction:
 def _find_bad(
     now: PathPrediction, without: dict[int, float]
 ) -> tuple[PathPrediction, dict[int, Removal], set[int]]:
-    """Find what must go: in changed windows first, and in the whole if nothing there.
+    """Find what must go; where nothing must, write the program.
 
-    A whole that comes out as its windows did is not judged again.
+    It is judged again only if it does not come out as its windows did.
 
     Args:
         now: The program.
@@ -72,7 +72,7 @@ def _find_bad(
         if bad or anew or now.written:
             return now, bad, anew
         now, alone = now.whole(), now
-        if now.agrees_with(alone):
+        if now.parts is alone.parts:
             return now, {}, set()
 
 
