@@ -7,7 +7,7 @@ sides times what the TCP moves as that joint goes from the middle to its upper f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
@@ -50,11 +50,6 @@ class FlankCase:
     rows: Ints
     across: Floats
     moved: Floats
-
-    def within(self, samples: slice) -> slice:
-        """Return which of its rows lie on a path."""
-        begin, end = np.searchsorted(self.rows, (samples.start, samples.stop))
-        return slice(int(begin), int(end))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,18 +115,10 @@ class FlankCases:
             weight = max(self._flanks[j - 1].weight[kind] for j in open_)
             yield self._case(open_[0], kind, weight, at, by[at])
 
-    def on_moves(self, moves: Sequence[int]) -> dict[Key, FlankCase]:
-        """Return the cases that make a difference on some moves."""
-        first = self._first_rows
-        there = [first[:, k + 1] > first[:, k] for k in moves]
-        found: list[int] = np.flatnonzero(np.any(there, axis=0)).tolist()
-        return {self._keys[k]: self.cases[k] for k in found}
-
-    @cached_property
-    def _first_rows(self) -> Ints:
-        """Return how many rows of each case lie in front of each move, (c, m + 1)."""
-        found = [np.searchsorted(case.rows, self.first) for case in self.cases]
-        return np.array(found, dtype=np.int64).reshape(len(found), len(self.first))
+    @property
+    def by_key(self) -> dict[Key, FlankCase]:
+        """Return the cases by joint, kind, and number of that kind."""
+        return dict(zip(self._keys, self.cases, strict=True))
 
     @cached_property
     def _keys(self) -> tuple[Key, ...]:

@@ -30,6 +30,7 @@ from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
 from postproc.compensation.paths.meant_sides import PlanSides
 from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy, gather_paths
+from postproc.compensation.paths.plan_outcomes import Predicted
 from postproc.compensation.paths.split_constraints import (
     hindrances,
     speeds_of_pieces,
@@ -367,6 +368,11 @@ class PathPrediction:
     def part_of(self, v: int) -> Part:
         """Return what tells of a visit of the source."""
         return self.parts[int(self.part[v])]
+
+    @property
+    def predicted(self) -> Predicted:
+        """Return what tells of its moves."""
+        return Predicted([part.paths for part in self.parts], self.part)
 
     def path_to(self, v: int) -> tuple[PathAccuracy, int]:
         """Return paths among which is that to a visit, and which it is."""

@@ -111,10 +111,6 @@ def _cures(now: PathPrediction) -> dict[int, str]:
 def _promises(now: PathPrediction) -> dict[int, float]:
     """Return what 95 % of every move stays within by all open hypotheses [m]."""
     task = now.task
-    now = task.predict(now.plan)
-    moves = {halves(task.visits, v) for v in now.sizes}
-    return {
-        v: compare((now.part_of(v).paths,), rows, task.tolerance).choose()[1]
-        for rows in moves
-        for v in rows
-    }
+    moves = sorted({halves(task.visits, v) for v in now.sizes})
+    found = compare([now.predicted], moves, task.tolerance)
+    return {v: found[rows].choose()[1] for rows in moves for v in rows}

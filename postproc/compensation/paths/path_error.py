@@ -126,7 +126,7 @@ class PathAccuracy:
         offset = begin - begin[lead][group]
 
         def whole(told: Deviations) -> Deviations:
-            part = _largest_in(told.sizes, group, lead)
+            part = largest_in(told.sizes, group, lead)
             return replace(told, largest=told.largest[part], shares=told.shares[part])
 
         return replace(
@@ -273,7 +273,7 @@ def _groups(owner: Ints) -> tuple[Ints, Ints]:
     return np.flatnonzero(begins), np.cumsum(begins) - 1
 
 
-def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
+def largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
     """Find the first of the largest values of every group, (g,)."""
     if not len(starts):
         return starts
@@ -308,7 +308,7 @@ def _deviations(
     unsure, starts = _uncertain_share(run, error), run.ways.first[:-1]
     if not len(starts):
         return Deviations(off, across, along, unsure, starts, np.empty((0, 6)))
-    largest = _largest_in(across, run.ways.way, starts)
+    largest = largest_in(across, run.ways.way, starts)
     shares = _shares(run, error, largest, way)
     return Deviations(off, across, along, unsure, largest, shares)
 

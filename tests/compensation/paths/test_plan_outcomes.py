@@ -10,7 +10,8 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
-from postproc.compensation.paths.plan_outcomes import BEGINS, compare
+from postproc.compensation.paths.plan_outcomes import BEGINS, MoveOutcomes, Predicted
+from postproc.compensation.paths.plan_outcomes import compare as compare_moves
 from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint
 from postproc.robot.pose import MM
 
@@ -36,6 +37,12 @@ def program(off: float, *cases: FlankCase) -> Any:
         row_of=lambda v: 0,
         after=SimpleNamespace(across=np.full(len(WAY), off * MM)),
     )  # fmt: skip
+
+
+def compare(plans: tuple[Any, ...], rows: tuple[int], most: float) -> MoveOutcomes:
+    """Compare the plans of one move."""
+    told = [Predicted([plan], np.zeros(8, dtype=np.int64)) for plan in plans]
+    return compare_moves(told, [rows], most)[rows]
 
 
 def case(joint: int, first: int, last: int, off: float, moved: float) -> FlankCase:
