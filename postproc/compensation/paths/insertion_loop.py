@@ -164,9 +164,9 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
             continue
         via = v in whole  # the point on the way of an arc becomes one, too
         more = _put_on_path(now, plan, v, room - via)
-        count = more.count - plan.count
-        if count or more.points.get(v) != plan.points.get(v):
-            room -= count + via
+        old, new = (one.points.get(v, ()) for one in (plan, more))
+        if old != new:
+            room -= len(new) - len(old) + via
             if via:
                 first = point_on_way(now.task.visits, v)
                 whole -= {first, first + 1}
