@@ -55,6 +55,7 @@ class PlanSides:
     first: InTime
     flanks: tuple[FlankOfJoint, ...]
     _known: dict[MeantKey, MeantSides] = field(default_factory=dict, repr=False)
+    _sides: dict[tuple[int, ...], Floats] = field(default_factory=dict, repr=False)
 
     def of_plan(self, plan: InsertionPlan) -> dict[int, MeantSides]:
         """Say from which sides points on ways are meant to be passed.
@@ -77,9 +78,12 @@ class PlanSides:
         """Yield the places of points on a move, and where joints are to lie there."""
         paths = self.first.paths
         own = [paths.samples_to(v) for v in move]
-        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
-        side = np.array(paths.side[own[0].start : own[-1].stop])
-        side[:, sharp] = cross_at_once(side[:, sharp])
+        if move not in self._sides:
+            sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
+            side = np.array(paths.side[own[0].start : own[-1].stop])
+            side[:, sharp] = cross_at_once(side[:, sharp])
+            self._sides[move] = side
+        side = self._sides[move]
         if half:
             side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
         samples = dict(zip(move, own, strict=True))
