@@ -18,7 +18,7 @@ from postproc.compensation.paths.plan_rule import (
     negligible,
     tolerable_harm,
 )
-from postproc.model.flank_hypotheses import OPEN
+from postproc.model.flank_hypotheses import OPEN, FlankKind
 from postproc.robot.pose import MM
 
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
@@ -53,9 +53,15 @@ class Objection:
         """Return what would tell, "" where nothing is open."""
         if self.key is None:
             return ""
+        if self.key[1] is FlankKind.RAN_ON:
+            return SLOWER
         return MEASURE.format(joint=self.key[0])
 
 
+SLOWER = (
+    "Let the JOINT move before it end at 20 % of the speed of the joints or less, or "
+    "measure a path (diagnose --path)"
+)
 MEASURE = (
     "Measure how joint {joint} changes its flank: survey.reversals, or diagnose --path"
 )
@@ -72,6 +78,7 @@ class MoveOutcomes:
         keys: The hypotheses behind the first one, that all joints do as predicted.
         weight: (h,).
         tolerance: Of paths [m].
+        largest: How far the last plan leaves the path at the most, (h,) [m].
     """
 
     plans: tuple[PlanOutcome, ...]
@@ -79,6 +86,12 @@ class MoveOutcomes:
     keys: tuple[Key, ...]
     weight: Floats
     tolerance: float
+    largest: Floats
+
+    @property
+    def worst(self) -> float:
+        """Return how far the last plan leaves the path by any open hypothesis [m]."""
+        return float(self.largest[self.weight > OPEN].max())
 
     def choose(self) -> tuple[int, float]:
         """Choose a plan, see `choose_plan`; return it and its promise [m]."""
@@ -134,6 +147,7 @@ def compare(
         own = np.any([ways.has(key) for ways in found], axis=0)
         there[:, k] = own & counts[:, key[0] - 1]
     off, worse, share = np.zeros((3, len(plans), *there.shape))
+    largest = np.zeros(there.shape)
     for k, hypothesis in enumerate([None, *keys]):
         rows = np.flatnonzero(there[:, k])
         for p, ways in enumerate(found if len(rows) else ()):
@@ -141,6 +155,7 @@ def compare(
             if p:
                 harm = ways.measure_harm(found[0], hypothesis, rows)
                 worse[p, rows, k], share[p, rows, k] = harm
+        largest[rows, k] = found[-1].measure_largest(hypothesis, rows)
     weight = _weigh(found, keys, there)
     return {
         rows: MoveOutcomes(
@@ -149,6 +164,7 @@ def compare(
             tuple(keys[k - 1] for k in np.flatnonzero(own)[1:]),
             weight[m, own],
             tolerance,
+            largest[m, own],
         )
         for m, (rows, own) in enumerate(zip(moves, there, strict=True))
     }
@@ -308,6 +324,11 @@ class _Ways:
         top = largest_in(more, own, first)
         whole = np.maximum(self.way[self.first[ways + 1] - 1], 1e-12)
         return more[top], np.minimum(self.way[samples[top]] / whole, LAST)
+
+    def measure_largest(self, key: Key | None, moves: Ints) -> Floats:
+        """Return the largest distance of some moves from their paths, (k,) [m]."""
+        largest = np.maximum.reduceat(self._distances(key), self._ends[:-1])
+        return np.asarray(largest[moves])
 
     def _samples_of(self, ways: Ints) -> tuple[Ints, Ints, Ints]:
         """Return the samples of ways, whose each is, and where those of each begin."""
