@@ -63,6 +63,7 @@ def test_harm_is_counted_place_by_place_and_named() -> None:
     )
     assert "how joint 3 changes its flank" in objection.cure
     assert found.choose() == (0, pytest.approx(0.1 * MM))
+    assert found.worst == pytest.approx(0.2 * MM)
     assert found.objection(0) is None
 
 
