@@ -138,7 +138,7 @@ def compare(
     """
     if not len(moves):
         return {}
-    found = [_Ways.of(plan, moves) for plan in plans]
+    found = [_PlannedMoves.of(plan, moves) for plan in plans]
     keys = [*dict.fromkeys(key for ways in found for key in ways.cases)]
     steps = np.max([ways.measure_steps() for ways in found], axis=0)
     counts = ~np.array([negligible(own, tolerance) for own in steps])
@@ -170,7 +170,7 @@ def compare(
     }
 
 
-def _weigh(found: Sequence[_Ways], keys: Sequence[Key], there: Bools) -> Floats:
+def _weigh(found: Sequence[_PlannedMoves], keys: Sequence[Key], there: Bools) -> Floats:
     """Return the weights of hypotheses, (m, h), that of what is predicted first.
 
     Args:
@@ -189,7 +189,7 @@ def _weigh(found: Sequence[_Ways], keys: Sequence[Key], there: Bools) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Ways:
+class _PlannedMoves:
     """The ways of m moves with one plan, s samples in all.
 
     Attributes:
@@ -212,7 +212,7 @@ class _Ways:
     usually: Floats
 
     @classmethod
-    def of(cls, plan: Predicted, moves: Sequence[Rows]) -> _Ways:
+    def of(cls, plan: Predicted, moves: Sequence[Rows]) -> _PlannedMoves:
         visits = np.array([v for rows in moves for v in rows])
         number = plan.part[visits]
         own = [plan.paths[k].samples_to(v) for k, v in zip(number, visits, strict=True)]
@@ -272,7 +272,7 @@ class _Ways:
         return np.asarray(far[order[place]])
 
     def measure_harm(
-        self, usual: _Ways, key: Key | None, moves: Ints
+        self, usual: _PlannedMoves, key: Key | None, moves: Ints
     ) -> tuple[Floats, Floats]:
         """Return how much farther moves are off than without points [m], and where.
 
@@ -299,7 +299,7 @@ class _Ways:
         return worst, at
 
     def _farther(
-        self, usual: _Ways, key: Key | None, ways: Ints, leads: Bools
+        self, usual: _PlannedMoves, key: Key | None, ways: Ints, leads: Bools
     ) -> tuple[Floats, Floats]:
         """Return how much farther ways are off than usual, and at which share.
 
