@@ -24,6 +24,7 @@ from postproc.robot.pose import MM
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
 
+TOGETHER = 256  # moves that are sorted in one table
 LAST = 1.0 - 1e-9  # share of a way that is still on it
 
 
@@ -259,17 +260,20 @@ class _PlannedMoves:
 
     def measure_off(self, key: Key | None, moves: Ints) -> Floats:
         """Return what 95 % of the way of some moves stays within, (k,) [m]."""
-        begin, end = self._ends[moves], self._ends[moves + 1]
-        count = end - begin
-        samples, move = spans(begin, count), np.repeat(np.arange(len(moves)), count)
-        far = self._distances(key)[samples]
-        order = np.lexsort((far, move))
-        done = np.cumsum(self._step[samples[order]])
-        last = np.cumsum(count) - 1
-        done -= np.append(0.0, done[last[:-1]])[move]
-        short = done < ALONG * done[last][move]
-        place = last + 1 - count + np.bincount(move[short], minlength=len(moves))
-        return np.asarray(far[order[place]])
+        far, found = self._distances(key), [np.empty(0)]
+        for k in range(0, len(moves), TOGETHER):
+            begin, end = (self._ends[moves[k : k + TOGETHER] + one] for one in (0, 1))
+            samples = begin[:, None] + np.arange(int((end - begin).max()))
+            behind = samples >= end[:, None]
+            samples[behind] = 0
+            off = np.where(behind, np.inf, far[samples])
+            order = np.argsort(off, axis=1)
+            step = np.where(behind, 0.0, self._step[samples])
+            done = np.cumsum(np.take_along_axis(step, order, axis=1), axis=1)
+            place = (done < ALONG * done[:, -1:]).sum(axis=1)
+            rows = np.arange(len(off))
+            found.append(off[rows, order[rows, place]])
+        return np.concatenate(found)
 
     def measure_harm(
         self, usual: _PlannedMoves, key: Key | None, moves: Ints
