@@ -85,6 +85,41 @@ pub fn ends<'py>(py: Python<'py>, clamps: &[Clamp]) -> Ends<'py> {
     )
 }
 
+const DIGITS: f64 = 1e9; // of a side: what is less is rounding of the way up to there
+
+/// Place joints in their plays along ways, (s, 6): the least and the largest side.
+///
+/// `half` is half of the width of the play at every sample, `begins` tells the first ones
+/// of ways, and `state` is what is known there, from the angle on, in halves of the width.
+#[pyfunction]
+pub fn sides_along<'py>(
+    py: Python<'py>,
+    angles: PyReadonlyArray2<'py, f64>,
+    half: PyReadonlyArray2<'py, f64>,
+    begins: PyReadonlyArray1<'py, bool>,
+    state: Clamps<'py>,
+) -> PyResult<Ends<'py>> {
+    let (angles, half) = (rows::<6>(&angles)?, rows::<6>(&half)?);
+    let (begins, state) = (flat(&begins)?, state.list()?);
+    same_length(&[angles.len(), half.len(), begins.len()])?;
+    same_length(&[state.len(), begins.iter().filter(|begins| **begins).count()])?;
+    let (mut known, mut u, mut z) = (state.iter(), [0.0; 6], Clamp::IDENTITY);
+    let sides = each(py, angles.len(), |i| {
+        if begins[i] {
+            (u, z) = ([0.0; 6], *known.next().unwrap_or(&Clamp::IDENTITY));
+        } else if i > 0 {
+            for j in 0..6 {
+                u[j] += 2.0 * (angles[i][j] - angles[i - 1][j]) / (half[i][j] + half[i - 1][j]);
+            }
+        }
+        z = z.then(&Clamp::passing(&u, &[1.0; 6]));
+        let side =
+            |z: &Six| std::array::from_fn(|j| ((u[j] - z[j]) * DIGITS).round_ties_even() / DIGITS);
+        Clamp { lo: side(&z.hi), hi: side(&z.lo) }
+    })?;
+    Ok(ends(py, &sides))
+}
+
 /// Compose the steps (n, 6) since the last beginning up to each one.
 #[pyfunction]
 pub fn prefix<'py>(

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from postproc.arrays import release_memory
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.base_frame_check import check_base
@@ -224,28 +222,31 @@ def finish(
     Raises:
         VerificationError: The output is not what was meant.
     """
-    output, again = write_and_verify(reading, kept, setting)
-    draft = CompensatedProgram(reading, kept, output, None)
-    if setting.options.times(len(reading.visits)):
-        from postproc.compensation.timing_comparison import run_in_time
-
-        with setting.clock("time"):
-            own = np.arange(len(reading.visits))
-            in_time = run_in_time(
-                reading, again, kept.position, setting,
-                own if setting.options.inserts else None,
-            )  # fmt: skip
-        draft = replace(draft, in_time=in_time)
-    del again  # holds as much as the program
-    release_memory(len(reading.visits))
     if setting.options.inserts:
         from postproc.compensation.paths.insertion_loop import correct_paths
 
-        draft = correct_paths(draft, setting, write_and_verify)
+        draft = correct_paths(reading, kept, setting, write_and_verify)
+    else:
+        draft = _write(reading, kept, setting)
+    release_memory(len(reading.visits))
     with setting.clock("report"):
         outcome = report(name, reading, draft, setting)
     release_memory(len(reading.visits))
     return outcome
+
+
+def _write(
+    reading: ParsedProgram, kept: WindowResult, setting: Job
+) -> CompensatedProgram:
+    """Write a program without points, and run it in time where that is asked for."""
+    output, again = write_and_verify(reading, kept, setting)
+    in_time = None
+    if setting.options.times(len(reading.visits)):
+        from postproc.compensation.timing_comparison import run_in_time
+
+        with setting.clock("time"):
+            in_time = run_in_time(reading, again, kept.position, setting)
+    return CompensatedProgram(reading, kept, output, in_time)
 
 
 def write_and_verify(

@@ -80,6 +80,10 @@ class ParsedProgram:
             return tuple((source, ()) for source in self.sources)
         return tuple(zip(self.given, self.cloned, strict=True))
 
+    def with_values(self, values: Floats) -> ParsedProgram:
+        """Return it as if its targets had other numbers, (n, w)."""
+        return replace(self, visits=self.visits.with_columns(values=values))
+
 
 @dataclass(frozen=True)
 class PlannedProgram:

@@ -288,7 +288,7 @@ def run_in_time(
         corners: How the source passes the visits; None: as the program does.
     """
     cell = setting.cell
-    before, after = (_run(part.visits, cell) for part in (reading, again))
+    before, after = (run_visits(part.visits, cell) for part in (reading, again))
     passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
     shift = np.nan_to_num(position + before.path.aside - passed)
     paths = predict_paths(
@@ -318,7 +318,8 @@ def describe_verification(in_motion: Mapping[str, str]) -> str:
     return f"{said}, not those of {rest}" if rest else said
 
 
-def _run(visits: Visits, cell: Cell) -> ProgramCycle:
+def run_visits(visits: Visits, cell: Cell) -> ProgramCycle:
+    """Run a program once, in time."""
     targets, _ = targets_from_visits(visits, cell)
     return run(cell.arm, targets)
 

@@ -3,6 +3,7 @@
 A model of a survey knows how far apart the flanks of a joint are. How the link gets
 from one to the other is one of six hypotheses. Each has a prior weight, and what was
 read multiplies it: at arrivals from both sides, in reversals, along a measured path.
+A seventh one speaks of fast stops, at which a link may run on: surveys arrive slowly.
 A weight is never scaled up when another hypothesis is excluded: knowing more closes
 hypotheses and opens none, but where readings contradict what the model says.
 """
@@ -33,6 +34,7 @@ class FlankKind(Enum):
     LATER = "changes its flank later"
     NEVER = "does not change its flank"
     PUSHED = "is pushed by its drive in motion, as all that run on at stops"
+    RAN_ON = "ran on at the fast stop where the move begins"
     START = "begins on the other flank"
 
 
@@ -43,6 +45,13 @@ PRIOR = 0.52, 0.23, 0.06, 0.06, 0.07, 0.06
 
 The last one is another one only for links that rest ahead of their drives at stops: by
 braking they run on, and on the way their drives push them.
+"""
+
+RUNS_ON = 0.06
+"""Weight of a link that runs on at a fast stop, before a measured path tells.
+
+Surveys and reversals move slowly, and do not tell. A model of links that rest ahead of
+their drives says so of all stops.
 """
 
 Likelihood = tuple[float, float, float, float, float, float]
@@ -57,6 +66,7 @@ _AT_STOPS: dict[str, Likelihood] = {
     "elastic": (0.01, 1.0, 1.0, 0.5, 0.02, 0.02),
     "unlike": (0.1, 0.2, 5.0, 1.0, 2.0, 2.0),  # the steps are not those of the model
 }
+_RAN_ON = {CONFIRMED: 0.1, "refuted": 4.0}
 _IN_MOTION: dict[str, Likelihood] = {
     CONFIRMED: (1.0, 0.1, 0.1, 0.1, 0.01, 0.01),
     "refuted": (0.05, 1.0, 4.0, 4.0, 4.0, 4.0),
@@ -84,7 +94,7 @@ class FlankOfJoint:
 
     @property
     def open_kinds(self) -> tuple[FlankKind, ...]:
-        """Return the hypotheses that count beside the one that is predicted."""
+        """Return how the joint may cross its gap beside what is predicted."""
         return tuple(
             kind
             for kind in _ORDER
@@ -134,6 +144,8 @@ def _of_joint(leads: bool, width: Width | None, in_motion: str) -> FlankOfJoint:
     most = most if np.isfinite(most) else max(GIVES, least)
     nominal = float(np.sqrt(least * most)) if stops == "elastic" else 1.0
     weights = dict(zip(_ORDER, weight.tolist(), strict=True))
+    runs_on = RUNS_ON * _RAN_ON.get(in_motion, 1.0)
+    weights[FlankKind.RAN_ON] = 0.0 if leads else runs_on
     return FlankOfJoint(weights, nominal, (least, most))
 
 

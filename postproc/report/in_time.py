@@ -143,6 +143,7 @@ def _points(
     for key, far in (
         ("without_mm", inserted.without),
         ("promise_mm", inserted.promises),
+        ("worst_mm", inserted.worst),
     ):
         told[key] = round(far[visit] / MM, 5) if visit in far else None
     return told

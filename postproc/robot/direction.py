@@ -28,12 +28,9 @@ from postproc.robot.backlash_operator import (
     chains_of,
     drive_paths,
     last_reversals,
-    passing,
-    prefix,
 )
 
 WIDTH_IN_PLAYS = 4.0
-SIDE_DIGITS = 9  # of a side: what is less is rounding of the way up to there
 
 
 @dataclass(frozen=True)
@@ -257,16 +254,9 @@ def sides_along(
         The least and the largest side that it may be, (s, 6) each from -1 to 1; equal
         where the side is known.
     """
-    angles, way = q @ arm.coupling.T, np.cumsum(begins) - 1
-    step = np.diff(angles, axis=0, prepend=angles[:1])
-    u = np.cumsum(2.0 * step / (half + np.roll(half, 1, axis=0)), axis=0)
-    u -= u[begins][way]
-    passed = prefix(passing(u, np.ones(6)), begins)
-    lo, hi = (
-        passed(((z - angles[begins]) / half_width(arm))[way])
-        for z in (play.lo, play.hi)
-    )
-    return np.round(u - hi, SIDE_DIGITS), np.round(u - lo, SIDE_DIGITS)
+    angles, own = q @ arm.coupling.T, half_width(arm)
+    lo, hi = ((z - angles[begins]) / own for z in (play.lo, play.hi))
+    return _native.sides_along(angles, half, begins, PlayOperator(lo, hi))
 
 
 def half_width(arm: Arm) -> Floats:

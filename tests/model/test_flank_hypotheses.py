@@ -85,6 +85,20 @@ def test_links_ahead_of_their_drives_leave_all_open(bench_model, bench_cell) -> 
     )
 
 
+def test_slow_measurements_leave_it_open_that_links_run_on(
+    bench_model, bench_cell
+) -> None:
+    for width in (None, (1.0, 1.5), (2.0, 4.5)):
+        flank = known(bench_model, bench_cell, width)
+        assert flank.is_open(FlankKind.RAN_ON)
+        assert FlankKind.RAN_ON not in flank.open_kinds  # no way to cross a gap
+    assert not known(bench_model, bench_cell, None, "confirmed").is_open(
+        FlankKind.RAN_ON
+    )
+    braked = replace(bench_model, values=-bench_model.values)
+    assert not known(braked, bench_cell).is_open(FlankKind.RAN_ON)
+
+
 def test_a_wider_flank_lacks_more(bench_model, bench_cell) -> None:
     wide = [(1.0, 1.5), (1.0, 2.0), (1.0, 2.5), (1.0, 4.0)]
     lags = [known(bench_model, bench_cell, width).max_lag for width in wide]

@@ -318,9 +318,12 @@ NO_ARCS = WantedArcs(
 )
 
 
+_CIRCULAR = int(Motion.CIRCULAR)  # looked up for every move in every round
+
+
 def is_arc(visits: Visits, visit: int) -> bool:
     """Tell whether a visit is the point on the way of an arc, or its end."""
-    return bool(visits.motion.kind[visit] == Motion.CIRCULAR)
+    return bool(visits.motion.kind[visit] == _CIRCULAR)
 
 
 def halves(visits: Visits, visit: int) -> tuple[int, ...]:

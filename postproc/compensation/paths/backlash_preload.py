@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.compensation.options import Job
 from postproc.compensation.paths.path_error import sides_on_move
 from postproc.language.visits import OrientationLaw, Visits
@@ -54,7 +54,7 @@ def cross_at_once(side: Floats) -> Floats:
     """
     out = np.array(side)
     step = np.sign(np.diff(side, axis=0)) * (np.abs(np.diff(side, axis=0)) > 1e-9)
-    for joint in range(side.shape[1]):
+    for joint in np.flatnonzero(step.any(axis=0)).tolist():
         sense = step[:, joint]
         for a, b in pairwise(np.flatnonzero(sense).tolist()):
             if sense[a] == sense[b]:
@@ -97,8 +97,9 @@ def take_up(
 
 
 def find_drive_turns(
-    setting: Job, visits: Visits, v: int, tool: Floats, q: Floats, crossed: Floats
-) -> Floats:
+    setting: Job, visits: Visits, v: Ints | int, tool: Floats, q: Floats,
+    crossed: Floats,
+) -> Floats:  # fmt: skip
     """Say what the tool has to turn by so that drives alone move.
 
     Where a program does not say how the tool turns on the way it must not turn.
@@ -106,8 +107,8 @@ def find_drive_turns(
     Args:
         setting: What the program is compensated with.
         visits: The program.
-        v: The visit at the end of the move.
-        tool: How the tool is mounted, (3, 3).
+        v: The visit at the end of the move, or of that of each place, (k,).
+        tool: How the tool is mounted, (3, 3) or (k, 3, 3).
         q: Joint angles at k places on its way, (k, 6) [rad].
         crossed: What each drive has crossed there since the move began, of its play,
             (k, 6) from -2 to 2.
@@ -116,10 +117,12 @@ def find_drive_turns(
         Rotation vectors in the tool's own frame, (k, 3) [rad].
     """
     cell, law = setting.cell, visits.motion.orientation_law[v]
-    known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
-    if setting.options.orientation or visits.motion.wrist_joint[v] or not known:
+    known = np.isin(law, (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS))
+    known &= ~visits.motion.wrist_joint[v]
+    if setting.options.orientation or not known.any():
         return np.zeros((len(q), 3))
     half = np.where(setting.gap > 0.0, half_widths(setting.model, cell.arm, q), 0.0)
     behind = q + np.linalg.solve(cell.arm.coupling, (crossed * half).T).T
     before, after = (cell.arm.flange(a)[:, :3, :3] @ tool for a in (q, behind))
-    return rotation_vector(np.swapaxes(before, 1, 2) @ after)
+    turn = rotation_vector(np.swapaxes(before, 1, 2) @ after)
+    return np.where(np.expand_dims(known, -1), turn, 0.0)

@@ -7,16 +7,21 @@ sides times what the TCP moves as that joint goes from the middle to its upper f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import zip_longest
+from itertools import chain, zip_longest
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.paths.path_states import CHANGED, AlongWays, ErrorAlong
-from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint, flanks_of
+from postproc.model.flank_hypotheses import (
+    FlankKind,
+    FlankOfJoint,
+    flanks_of,
+    nominal_widths,
+)
 from postproc.robot.pose import lengths
 
 LATE = 0.01  # [m] of the way by which a flank changes later
@@ -26,6 +31,9 @@ UNSURE = 1e-3  # of half the play: a side that is known
 
 _WIDE = FlankKind.SHARP, FlankKind.ELASTIC, FlankKind.EARLIER
 """Hypotheses that say over how many gaps a joint goes."""
+
+_TOGETHER = FlankKind.PUSHED, FlankKind.RAN_ON
+"""Hypotheses that have one cause in all joints, and are tried for all together too."""
 
 Key = tuple[int, FlankKind, int]
 """A joint (from 1), what it does, and which of its cases of that kind it is."""
@@ -51,11 +59,6 @@ class FlankCase:
     across: Floats
     moved: Floats
 
-    def within(self, samples: slice) -> slice:
-        """Return which of its rows lie on a path."""
-        begin, end = np.searchsorted(self.rows, (samples.start, samples.stop))
-        return slice(int(begin), int(end))
-
 
 @dataclass(frozen=True, eq=False)
 class FlankCases:
@@ -80,7 +83,8 @@ class FlankCases:
     @cached_property
     def cases(self) -> tuple[FlankCase, ...]:
         """Return the cases that make any difference."""
-        found, pushed = list[FlankCase](), np.zeros_like(self.off)
+        found = list[FlankCase]()
+        together = {kind: np.zeros_like(self.off) for kind in _TOGETHER}
         for joint, flank in enumerate(self._flanks):
             sides = [*self._sides(joint, flank)]
             rows = [np.flatnonzero(np.abs(own - self.run.side[:, joint]) > CHANGED)
@@ -92,9 +96,10 @@ class FlankCases:
                 by = (own - self.run.side[:, joint])[at, None] * moves[at]
                 if len(at):
                     found.append(self._case(joint + 1, kind, weight, at, by))
-                if kind is FlankKind.PUSHED:
-                    pushed[at] += by
-        return (*found, *self._all_pushed(pushed))
+                if kind in together:
+                    together[kind][at] += by
+        all_of = (self._all_of(kind, by) for kind, by in together.items())
+        return (*found, *chain.from_iterable(all_of))
 
     def _case(
         self, joint: int, kind: FlankKind, weight: float, at: Ints, by: Floats
@@ -105,33 +110,25 @@ class FlankCases:
         across = lengths(there - along[:, None] * self.tangent[at])
         return FlankCase(joint, kind, weight, at, across, lengths(by))
 
-    def _all_pushed(self, by: Floats) -> Iterator[FlankCase]:
+    def _all_of(self, kind: FlankKind, by: Floats) -> Iterator[FlankCase]:
         """Yield the case of all links that run on at stops; they have one cause.
 
         It counts as one of the first of these joints.
 
         Args:
+            kind: What they do on the way.
             by: What it moves the TCP by, (s, 3) [m].
         """
-        kind = FlankKind.PUSHED
         open_ = [j for j, flank in enumerate(self._flanks, 1) if flank.is_open(kind)]
         at = np.flatnonzero(by.any(axis=1))
         if len(open_) > 1 and len(at):
             weight = max(self._flanks[j - 1].weight[kind] for j in open_)
             yield self._case(open_[0], kind, weight, at, by[at])
 
-    def on_moves(self, moves: Sequence[int]) -> dict[Key, FlankCase]:
-        """Return the cases that make a difference on some moves."""
-        first = self._first_rows
-        there = [first[:, k + 1] > first[:, k] for k in moves]
-        found: list[int] = np.flatnonzero(np.any(there, axis=0)).tolist()
-        return {self._keys[k]: self.cases[k] for k in found}
-
-    @cached_property
-    def _first_rows(self) -> Ints:
-        """Return how many rows of each case lie in front of each move, (c, m + 1)."""
-        found = [np.searchsorted(case.rows, self.first) for case in self.cases]
-        return np.array(found, dtype=np.int64).reshape(len(found), len(self.first))
+    @property
+    def by_key(self) -> dict[Key, FlankCase]:
+        """Return the cases by joint, kind, and number of that kind."""
+        return dict(zip(self._keys, self.cases, strict=True))
 
     @cached_property
     def _keys(self) -> tuple[Key, ...]:
@@ -170,6 +167,9 @@ class FlankCases:
                 yield kind, weight, -usual
             else:
                 yield kind, weight, usual[self.first[:-1]][self._move]
+        if flank.is_open(FlankKind.RAN_ON):
+            kind = FlankKind.RAN_ON
+            yield kind, flank.weight[kind], self._ran_on[:, joint]
         least, most = self.run.least[:, joint], self.run.most[:, joint]
         if (most - least > UNSURE).any():
             yield FlankKind.START, 1.0, least
@@ -194,6 +194,11 @@ class FlankCases:
         columns = zip_longest(*self._widths, fillvalue=1.0)
         cell = self.error.cell
         return [self.run.over(cell, np.array(width)).side for width in columns]
+
+    @cached_property
+    def _ran_on(self) -> Floats:
+        """The sides of all joints whose links ran on at fast stops, (s, 6)."""
+        return self.run.run_on(self.error.cell, nominal_widths(self._flanks))
 
     @cached_property
     def _move(self) -> Ints:

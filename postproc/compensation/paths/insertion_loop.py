@@ -55,7 +55,9 @@ from postproc.compensation.paths.insertion_summary import summarize
 from postproc.compensation.paths.prune import judge
 from postproc.compensation.paths.reapproach import insert_reapproaches
 from postproc.compensation.paths.split_selection import find_split
-from postproc.compensation.pipeline import CompensatedProgram
+from postproc.compensation.pipeline import CompensatedProgram, WindowResult
+from postproc.compensation.program import ParsedProgram
+from postproc.compensation.timing_comparison import run_in_time
 from postproc.language.languages import language_of
 
 ROUNDS = 16  # of points put on the ways
@@ -67,24 +69,26 @@ Rule = Callable[[PathPrediction], InsertionPlan]
 
 
 def correct_paths(
-    draft: CompensatedProgram, setting: Job, write: Write
+    reading: ParsedProgram, kept: WindowResult, setting: Job, write: Write
 ) -> CompensatedProgram:
     """Put points on the ways of a corrected program where it leaves them too far.
 
     Args:
-        draft: The program, run in time.
+        reading: The program.
+        kept: How it is corrected.
         setting: What it is compensated with, a tolerance of paths among it.
         write: Writes a corrected program, and reads it again.
 
     Returns:
-        The program, `kept` speaking of the visits of the source.
+        The program, written; `kept` speaks of the visits of the source.
     """
-    reading, first = draft.reading, draft.in_time
-    if first is None or not setting.options.inserts:
-        return draft
     language = language_of(reading.sources[0].name)
     splitter = language.splitter(reading.sources)
-    task = InsertionTask(draft, first, setting, write, splitter)
+    again = reading.with_values(kept.decisions.corrected)
+    with setting.clock("time"):
+        own = np.arange(len(reading.visits))
+        first = run_in_time(reading, again, kept.position, setting, own)
+    task = InsertionTask(reading, kept, first, setting, write, splitter)
     now = task.predict(InsertionPlan())
     if setting.options.reapproach:
         now = insert_reapproaches(now)
@@ -160,9 +164,9 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
             continue
         via = v in whole  # the point on the way of an arc becomes one, too
         more = _put_on_path(now, plan, v, room - via)
-        count = more.count - plan.count
-        if count or more.points.get(v) != plan.points.get(v):
-            room -= count + via
+        old, new = (one.points.get(v, ()) for one in (plan, more))
+        if old != new:
+            room -= len(new) - len(old) + via
             if via:
                 first = point_on_way(now.task.visits, v)
                 whole -= {first, first + 1}

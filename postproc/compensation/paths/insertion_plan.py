@@ -72,9 +72,11 @@ class InsertionPlan:
 
     def put(self, v: int, shares: Collection[float]) -> InsertionPlan:
         """Put other points on the way of a move; none where there are no shares."""
-        others = {k: own for k, own in self.points.items() if k != v}
-        own = {v: tuple(sorted(map(float, shares)))} if shares else {}
-        return replace(self, points=others | own)
+        points = dict(self.points)
+        points.pop(v, None)
+        if shares:
+            points[v] = tuple(sorted(map(float, shares)))
+        return replace(self, points=points)
 
     def drop(self, v: int, gone: Collection[float]) -> InsertionPlan:
         """Take back points of a move; pieces that grow by it are chords no more."""

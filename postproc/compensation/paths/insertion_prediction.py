@@ -25,10 +25,12 @@ from postproc.compensation.paths.changed_windows import (
     Windows,
     take_windows,
 )
+from postproc.compensation.paths.gathered import Gathered
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
 from postproc.compensation.paths.meant_sides import PlanSides
 from postproc.compensation.paths.moved_corners import SourceCorners
-from postproc.compensation.paths.path_error import PathAccuracy
+from postproc.compensation.paths.path_error import PathAccuracy, gather_paths
+from postproc.compensation.paths.plan_outcomes import Predicted
 from postproc.compensation.paths.split_constraints import (
     hindrances,
     speeds_of_pieces,
@@ -40,22 +42,19 @@ from postproc.compensation.paths.write_points import (
     lines_in_files,
 )
 from postproc.compensation.pipeline import (
-    BY_VISIT,
-    EXPLAINING,
     CompensatedProgram,
     WindowResult,
     correct,
 )
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.rewrite import Output
-from postproc.compensation.timing_comparison import InTime, run_in_time
+from postproc.compensation.timing_comparison import InTime, run_in_time, run_visits
 from postproc.language.insert_moves import Splitter
 from postproc.language.visits import Visits
 from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
-AGREE = 1e-6  # [m] by which two predictions of a move may differ
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
 Write = Callable[[ParsedProgram, WindowResult, Job], tuple[Output, ParsedProgram]]
@@ -66,11 +65,11 @@ class Whole:
     """A program with the points of a plan, written.
 
     Attributes:
-        part: All of its visits.
-        program: It, corrected; the source where there are no points.
+        own: Which of its visits each visit of the source is, (n,).
+        program: It, corrected and in time.
     """
 
-    part: Part
+    own: Ints
     program: CompensatedProgram
 
 
@@ -79,30 +78,32 @@ class InsertionTask:
     """A corrected program that may get points.
 
     Attributes:
-        source: The program without points.
-        first: .. in time.
+        reading: The program without points.
+        kept: How it is corrected.
+        first: It, corrected, in time.
         setting: What it is compensated with.
         write: Writes a corrected program, and reads it again.
         splitter: Writes points into its files.
     """
 
-    source: CompensatedProgram
+    reading: ParsedProgram
+    kept: WindowResult
     first: InTime
     setting: Job
     write: Write
     splitter: Splitter
-    _whole: dict[Written, Whole] = field(default_factory=dict, repr=False)
+    _whole: dict[Written, PathPrediction] = field(default_factory=dict, repr=False)
     _parts: dict[tuple[int, Key], Part] = field(default_factory=dict, repr=False)
 
     @property
     def visits(self) -> Visits:
         """Return the visits of the source, n."""
-        return self.source.reading.visits
+        return self.reading.visits
 
     @cached_property
     def lines(self) -> Ints:
         """Return the lines of the source's visits in its files, (n,)."""
-        return lines_in_files(self.source.reading, self.setting.cell)
+        return lines_in_files(self.reading, self.setting.cell)
 
     @cached_property
     def flanks(self) -> tuple[FlankOfJoint, ...]:
@@ -134,7 +135,7 @@ class InsertionTask:
 
     @cached_property
     def _hindrances(self) -> dict[int, str]:
-        decided, keeps_aux = self.source.kept.decisions, self.splitter.keeps_aux
+        decided, keeps_aux = self.kept.decisions, self.splitter.keeps_aux
         return hindrances(
             self.visits, decided, self.first.before, self.setting.cell, self.speeds,
             keeps_aux,
@@ -163,19 +164,18 @@ class InsertionTask:
         Only windows whose points, or whose run-up's, have not been predicted lately;
         of short programs, and where that is most of it, all.
         """
-        if plan.approaches or len(self.visits) < changed_windows.LEAST:
+        short = len(self.visits) < changed_windows.LEAST
+        if plan.approaches or (plan.points and short):
             return self.predict_whole(plan)
         keys = self.windows.list_keys(plan)
         new = [k for k, key in keys.items() if (k, key) not in self._parts]
         if new and not self._predict_windows(plan, keys, new):
             return self.predict_whole(plan)
         part = np.zeros(len(self.visits), dtype=np.int64)
-        parts = [self._source]
+        parts = {self._source: 0}  # no two of them are equal
         for k, key in keys.items():
-            found = self._parts[k, key]
-            if found is not parts[-1]:
-                parts.append(found)
-            part[self.windows.own(k)] = len(parts) - 1
+            number = parts.setdefault(self._parts[k, key], len(parts))
+            part[self.windows.own(k)] = number
         return PathPrediction(self, plan, tuple(parts), part)
 
     def predict_whole(self, plan: InsertionPlan) -> PathPrediction:
@@ -188,23 +188,47 @@ class InsertionTask:
         self._whole[key] = found
         if len(self._whole) > KEPT:
             del self._whole[next(iter(self._whole))]
-        part = np.zeros(len(self.visits), dtype=np.int64)
-        return PathPrediction(self, plan, (found.part,), part, found.program)
+        return replace(found, plan=plan)
 
     @cached_property
     def _source(self) -> Part:
         own = np.arange(len(self.visits))
-        return Part(self.visits, self.source.kept, self.first, own)
+        return Part(self.visits, self.kept, self.first, own)
 
-    def _make(self, plan: InsertionPlan) -> Whole:
-        if not (plan.points or plan.approaches):
-            return Whole(self._source, self.source)
+    def _make(self, plan: InsertionPlan) -> PathPrediction:
         reading, own = self._insert(plan)
         reading, kept = self._correct(reading)
         output, again = self.write(reading, kept, self.setting)
         owner = np.searchsorted(own, np.arange(len(reading.visits)))
         part = self._run(plan, reading, again, kept, own, owner)
-        return Whole(part, CompensatedProgram(reading, kept, output, part.in_time))
+        program = CompensatedProgram(reading, kept, output, part.in_time)
+        number = np.zeros(len(self.visits), dtype=np.int64)
+        return PathPrediction(self, plan, (part,), number, Whole(own, program))
+
+    def write_whole(self, now: PathPrediction) -> PathPrediction:
+        """Write a program as its windows were corrected.
+
+        It is run in time once more. Where its joints arrive as in the windows, these
+        tell of it; else all of it is corrected and predicted.
+        """
+        plan = now.plan
+        if not plan.points:
+            output, _ = self.write(self.reading, self.kept, self.setting)
+            program = CompensatedProgram(self.reading, self.kept, output, self.first)
+            return replace(now, written=Whole(now.parts[0].own, program))
+        reading, own = self._insert(plan)
+        gathered = Gathered.of(now.parts, now.part, own, len(reading.visits))
+        kept = gathered.correct(reading)
+        if kept is None:
+            return self.predict_whole(plan)
+        output, again = self.write(reading, kept, self.setting)
+        with self.setting.clock("time"):
+            after = run_visits(again.visits, self.setting.cell)
+        if not gathered.arrives_as(after, "travel" in self.setting.model.needs):
+            return self.predict_whole(plan)
+        in_time = replace(self.first, after=after, paths=now.paths)
+        program = CompensatedProgram(reading, kept, output, in_time)
+        return replace(now, written=Whole(own, program))
 
     def _run(
         self, plan: InsertionPlan, reading: ParsedProgram, again: ParsedProgram,
@@ -246,8 +270,7 @@ class InsertionTask:
         reading, rows = self._insert(plan)
         reading, mine, taken = take_windows(reading, rows, inside, seeds, windows.q)
         reading, kept = self._correct(reading)
-        values = kept.decisions.corrected
-        again = replace(reading, visits=reading.visits.with_columns(values=values))
+        again = reading.with_values(kept.decisions.corrected)
         owner = np.searchsorted(rows, taken)
         part = self._run(plan, reading, again, kept, mine, owner)
         if not self._is_where_it_was(part, inside):
@@ -269,7 +292,7 @@ class InsertionTask:
                 plan.points, plan.preloads, plan.chords, plan.approaches,
                 self.sides.of_plan(plan), self._joints_along,
             )  # fmt: skip
-            return insert(self.source.reading, put, self.splitter, self.setting.cell)
+            return insert(self.reading, put, self.splitter, self.setting.cell)
 
     def _correct(self, reading: ParsedProgram) -> tuple[ParsedProgram, WindowResult]:
         options = self.setting.options.without_clones()
@@ -305,40 +328,51 @@ class PathPrediction:
     plan: InsertionPlan
     parts: tuple[Part, ...]
     part: Ints
-    written: CompensatedProgram | None = None
+    written: Whole | None = None
 
     @property
     def program(self) -> CompensatedProgram:
         """Return it with its points, corrected; the source where there are none."""
-        return self.whole().written or self.task.source
+        return self._whole.program
 
     @property
     def own(self) -> Ints:
         """Return the visits of it that the source makes, (n,)."""
-        return self.whole().parts[0].own
+        return self._whole.own
 
     @property
     def in_time(self) -> InTime:
         """Return the program in time."""
-        return self.whole().parts[0].in_time
+        found = self._whole.program.in_time
+        assert found is not None
+        return found
+
+    @property
+    def _whole(self) -> Whole:
+        found = self.whole().written
+        assert found is not None
+        return found
 
     def whole(self) -> PathPrediction:
-        """Return the same, written and predicted as a whole."""
-        return self if self.written else self.task.predict_whole(self.plan)
+        """Return the same, written."""
+        return self if self.written else self.task.write_whole(self)
 
-    def agrees_with(self, other: PathPrediction) -> bool:
-        """Return True if all moves and points come out as another one predicts them."""
-        mine, others = self.sizes, other.sizes
-        return (
-            mine.keys() == others.keys()
-            and all(abs(mine[v] - others[v]) <= AGREE for v in mine)
-            and self.refusals == other.refusals
-            and self.flat.keys() == other.flat.keys()
-        )
+    @property
+    def paths(self) -> PathAccuracy:
+        """Return how it keeps to its paths, from what was predicted of each."""
+        paths = [part.paths for part in self.parts]
+        mine = [np.flatnonzero(self.part[own.visit] == k)
+                for k, own in enumerate(paths)]  # fmt: skip
+        return gather_paths(paths, mine)
 
     def part_of(self, v: int) -> Part:
         """Return what tells of a visit of the source."""
         return self.parts[int(self.part[v])]
+
+    @property
+    def predicted(self) -> Predicted:
+        """Return what tells of its moves."""
+        return Predicted([part.paths for part in self.parts], self.part)
 
     def path_to(self, v: int) -> tuple[PathAccuracy, int]:
         """Return paths among which is that to a visit, and which it is."""
@@ -443,20 +477,3 @@ class PathPrediction:
 def cut_arcs(visits: Visits, plan: InsertionPlan) -> list[int]:
     """Return the points on the ways of the arcs that a plan cuts."""
     return sorted(v for v in plan.points if visits.motion.via[v])
-
-
-def of_source(kept: WindowResult, own: Ints) -> WindowResult:
-    """Keep what is told of some visits (n,) of a corrected program."""
-    moved = np.isin(np.flatnonzero(kept.corrected), own)
-    explained = len(kept.travel) > 0
-    return replace(
-        kept,
-        decisions=kept.decisions.part(own),
-        before=kept.before[moved],
-        after=kept.after[moved],
-        departure=kept.departure[own]
-        if len(kept.departure) == len(kept.corrected)
-        else kept.departure,
-        **{name: getattr(kept, name)[own] for name in BY_VISIT},
-        **{name: getattr(kept, name)[own] for name in EXPLAINING if explained},
-    )

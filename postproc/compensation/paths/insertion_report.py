@@ -30,6 +30,7 @@ class Insertions:
             whose speed is not known; 0 where there are none.
         approaches: Share of the way at which targets are approached anew, by visit: to
             a stop, and on to the target.
+        worst: How far each leaves its path at the most by any of them [m].
         unconfirmed: Moves before which play is not taken up, as no measured path
             confirms how their flanks change.
     """
@@ -46,6 +47,7 @@ class Insertions:
     cures: Mapping[int, str] = field(default_factory=dict)
     cell_mm_s: float = 0.0
     limit_mm_s: float = 0.0
+    worst: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

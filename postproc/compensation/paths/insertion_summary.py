@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.compensation.paths.arcs import halves
-from postproc.compensation.paths.insertion_prediction import PathPrediction, of_source
+from postproc.compensation.paths.gathered import take_visits
+from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import sizes_of
-from postproc.compensation.paths.plan_outcomes import BEGINS, compare
+from postproc.compensation.paths.plan_outcomes import BEGINS, MoveOutcomes, compare
 from postproc.compensation.paths.reapproach import find_reapproaches
 from postproc.compensation.paths.split_selection import can_stop
 from postproc.compensation.pipeline import CompensatedProgram
@@ -39,13 +40,14 @@ def summarize(now: PathPrediction) -> CompensatedProgram:
     in_time = replace(
         now.in_time, before=now.task.first.before, inserted=_report_insertions(now)
     )
-    kept = of_source(now.program.kept, now.own)
+    kept = take_visits(now.program.kept, now.own)
     return replace(now.program, kept=kept, in_time=in_time)
 
 
 def _report_insertions(now: PathPrediction) -> Insertions:
     """Say what was put on ways, and why moves that are left too far got nothing."""
     task, plan, visits = now.task, now.plan, now.task.visits
+    outcomes = _outcomes(now)
     why = "its pieces would be too short, or the path no better"
     if plan.crowded:
         why = "no more points may be inserted (max_inserted)"
@@ -62,12 +64,13 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.stops & plan.points.keys(),
         left,
         sizes_of(task.first.paths),
-        _promises(now),
+        {v: one.choose()[1] for v, one in outcomes.items()},
         find_reapproaches(now),
         plan.unconfirmed,
         _cures(now),
         _cell_speed(now),
         _limit_speed(now),
+        {v: one.worst for v, one in outcomes.items()},
     )
 
 
@@ -107,13 +110,8 @@ def _cures(now: PathPrediction) -> dict[int, str]:
     return found
 
 
-def _promises(now: PathPrediction) -> dict[int, float]:
-    """Return what 95 % of every move stays within by all open hypotheses [m]."""
-    task = now.task
-    now = task.predict(now.plan)
-    moves = {halves(task.visits, v) for v in now.sizes}
-    return {
-        v: compare((now.part_of(v).paths,), rows, task.tolerance).choose()[1]
-        for rows in moves
-        for v in rows
-    }
+def _outcomes(now: PathPrediction) -> dict[int, MoveOutcomes]:
+    """Return how moves do with their points by all open hypotheses, by visit."""
+    moves = sorted({halves(now.task.visits, v) for v in now.sizes})
+    found = compare([now.predicted], moves, now.task.tolerance)
+    return {v: one for rows, one in found.items() for v in rows}

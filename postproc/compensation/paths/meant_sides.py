@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,60 +55,81 @@ class PlanSides:
     first: InTime
     flanks: tuple[FlankOfJoint, ...]
     _known: dict[MeantKey, MeantSides] = field(default_factory=dict, repr=False)
+    _sides: dict[tuple[int, ...], Floats] = field(default_factory=dict, repr=False)
 
     def of_plan(self, plan: InsertionPlan) -> dict[int, MeantSides]:
         """Say from which sides points on ways are meant to be passed.
 
         An arc is one way, from where it begins to where it ends.
         """
-        found = dict[int, MeantSides]()
+        keys, new = dict[int, MeantKey](), list[_PointsOnWay]()
         for move in {halves(self.visits, v) for v in plan.points}:
             half = bool(plan.halved.intersection(move))
-            keys = {v: (v, plan.points[v], half) for v in move if v in plan.points}
-            if not self._known.keys() >= {*keys.values()}:
-                self._mean_on(move, keys.values(), half)
-            found.update({v: self._known[key] for v, key in keys.items()})
-        return found
+            own = {v: (v, plan.points[v], half) for v in move if v in plan.points}
+            if not self._known.keys() >= {*own.values()}:
+                new += self._points_on(move, own.values(), half)
+            keys |= own
+        self._known.update(self._mean(new))
+        return {v: self._known[key] for v, key in keys.items()}
 
-    def _mean_on(
+    def _points_on(
         self, move: tuple[int, ...], keys: Collection[MeantKey], half: bool
-    ) -> None:
-        """Say from which sides points on a move are meant to be passed, and keep it."""
+    ) -> Iterator[_PointsOnWay]:
+        """Yield the places of points on a move, and where joints are to lie there."""
         paths = self.first.paths
         own = [paths.samples_to(v) for v in move]
-        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
-        side = np.array(paths.side[own[0].start : own[-1].stop])
-        side[:, sharp] = cross_at_once(side[:, sharp])
+        if move not in self._sides:
+            sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
+            side = np.array(paths.side[own[0].start : own[-1].stop])
+            side[:, sharp] = cross_at_once(side[:, sharp])
+            self._sides[move] = side
+        side = self._sides[move]
         if half:
             side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
         samples = dict(zip(move, own, strict=True))
         for key in keys:
             rows = samples[key[0]]
-            there = side[rows.start - own[0].start :]
-            self._known[key] = self._mean(key[0], key[1], rows, side[0], there)
+            way = paths.way[rows]
+            ends = np.array([0.0, *key[1], 1.0]) * way[-1]
+            at = rows.start + np.searchsorted(way, ends).clip(0, len(way) - 1)
+            there = side[at - own[0].start]
+            yield _PointsOnWay(key, paths.q[at], there, there - side[0])
 
-    def _mean(
-        self, v: int, points: Sequence[float], rows: slice, begin: Floats, side: Floats
-    ) -> MeantSides:
-        """Say from which sides the points of one way are meant to be passed.
-
-        Args:
-            v: The visit at its end.
-            points: Shares of the way, (k,).
-            rows: Its samples.
-            begin: Where joints lie in their play where the move begins, (6,).
-            side: .. at these samples, and any behind them, (s, 6).
-        """
-        paths = self.first.paths
-        way = paths.way[rows]
-        ends = np.array([0.0, *points, 1.0]) * way[-1]
-        at = np.searchsorted(way, ends).clip(0, len(way) - 1)
-        tool, there = self.first.after.targets.tool[v, :3, :3], side[at]
-        turn = find_drive_turns(
-            self.setting, self.visits, v, tool, paths.q[at + rows.start], there - begin
+    def _mean(self, new: Sequence[_PointsOnWay]) -> dict[MeantKey, MeantSides]:
+        """Say from which sides the points on some ways are meant to be passed."""
+        if not new:
+            return {}
+        v = np.repeat([one.key[0] for one in new], [len(one.q) for one in new])
+        q, crossed = (
+            np.concatenate([getattr(one, name) for one in new])
+            for name in ("q", "crossed")
         )
-        between = (there[:-1] + there[1:]) / 2
-        return MeantSides(there[1:-1], turn[1:-1], between)
+        tool = self.first.after.targets.tool[v, :3, :3]
+        turn = find_drive_turns(self.setting, self.visits, v, tool, q, crossed)
+        turns = np.split(turn, np.cumsum([len(one.q) for one in new])[:-1])
+        return {
+            one.key: MeantSides(
+                one.side[1:-1], own[1:-1], (one.side[:-1] + one.side[1:]) / 2
+            )
+            for one, own in zip(new, turns, strict=True)
+        }
+
+
+@dataclass(frozen=True)
+class _PointsOnWay:
+    """Both ends of a way, and the points on it, k places.
+
+    Attributes:
+        key: The visit at its end, and its points.
+        q: Joint angles there, (k, 6) [rad].
+        side: Where joints are to lie in their play, (k, 6).
+        crossed: .. and what they have crossed since the move began, (k, 6).
+    """
+
+    key: MeantKey
+    q: Floats
+    side: Floats
+    crossed: Floats
 
 
 def _evenly(side: Floats, ways: list[Floats]) -> Floats:

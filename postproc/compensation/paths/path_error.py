@@ -10,7 +10,9 @@ programmed path, across it; what lags along the path is told apart.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -124,7 +126,7 @@ class PathAccuracy:
         offset = begin - begin[lead][group]
 
         def whole(told: Deviations) -> Deviations:
-            part = _largest_in(told.sizes, group, lead)
+            part = largest_in(told.sizes, group, lead)
             return replace(told, largest=told.largest[part], shares=told.shares[part])
 
         return replace(
@@ -135,6 +137,52 @@ class PathAccuracy:
             before=whole(self.before),
             after=whole(self.after),
         )
+
+
+def gather_paths(parts: Sequence[PathAccuracy], rows: Sequence[Ints]) -> PathAccuracy:
+    """Take paths of several predictions of a program, in the order of their visits.
+
+    Args:
+        parts: The predictions; the first one is of all of it.
+        rows: The paths that are taken of each.
+    """
+    pairs = [*zip(parts, rows, strict=True)]
+    visit = np.concatenate([part.visit[own] for part, own in pairs])
+    order = np.argsort(visit)
+    begin = np.concatenate([part.first[own] for part, own in pairs])[order]
+    count = np.concatenate([np.diff(part.first)[own] for part, own in pairs])[order]
+    samples = np.cumsum([0, *(len(part.way) for part in parts)])
+    part_of = np.repeat(np.arange(len(parts)), [len(own) for own in rows])[order]
+    every = spans(begin + samples[part_of], count)
+    first = np.append(0, np.cumsum(count))
+
+    def gather(told: Sequence[Deviations]) -> Deviations:
+        own = [*zip(told, rows, strict=True)]
+        largest = np.concatenate([one.largest[k] for one, k in own])[order]
+        return Deviations(
+            **_gather_columns(told, ("off", "across", "along", "unsure"), every),
+            largest=largest - begin + first[:-1],
+            shares=np.concatenate([one.shares[k] for one, k in own])[order],
+        )
+
+    return PathAccuracy(
+        visit=visit[order],
+        first=first,
+        before=gather([part.before for part in parts]),
+        after=gather([part.after for part in parts]),
+        unknown=parts[0].unknown + len(parts[0]) - len(visit),
+        **_gather_columns(parts, ("way", "tangent", "crossing", "q", "side"), every),
+    )
+
+
+def _gather_columns(
+    parts: Sequence[Any], names: Sequence[str], rows: Ints
+) -> dict[str, Any]:
+    """Return rows of columns, the parts one after the other."""
+    return {
+        name: np.concatenate([getattr(part, name) for part in parts])[rows]
+        for name in names
+    }
 
 
 def sizes_of(paths: PathAccuracy) -> dict[int, float]:
@@ -225,7 +273,7 @@ def _groups(owner: Ints) -> tuple[Ints, Ints]:
     return np.flatnonzero(begins), np.cumsum(begins) - 1
 
 
-def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
+def largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
     """Find the first of the largest values of every group, (g,)."""
     if not len(starts):
         return starts
@@ -260,7 +308,7 @@ def _deviations(
     unsure, starts = _uncertain_share(run, error), run.ways.first[:-1]
     if not len(starts):
         return Deviations(off, across, along, unsure, starts, np.empty((0, 6)))
-    largest = _largest_in(across, run.ways.way, starts)
+    largest = largest_in(across, run.ways.way, starts)
     shares = _shares(run, error, largest, way)
     return Deviations(off, across, along, unsure, largest, shares)
 

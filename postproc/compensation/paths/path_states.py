@@ -13,11 +13,14 @@ from postproc.model.backlash_width import half_widths, on_the_way
 from postproc.model.flank_hypotheses import flanks_of, nominal_widths
 from postproc.model.model import Model
 from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.backlash_operator import PlayOperator
 from postproc.robot.cell import Cell
-from postproc.robot.direction import sides_along
+from postproc.robot.direction import half_width, sides_along
 from postproc.robot.state import make_states
+from postproc.robot.trajectory import Motion
 
 FINE = 8  # parts of an interval in which a joint changes its flank
+SLOW = 0.2  # of the highest speed of a joint: so fast surveys move, and links rest
 CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
 
 
@@ -74,6 +77,29 @@ class AlongWays:
         least, most = on_the_way(least, width), on_the_way(most, width)
         return cls(cycle, ways, half, least, most)
 
+    def run_on(self, cell: Cell, width: Floats) -> Floats:
+        """Return the sides of joints if links ran on at fast stops, (s, 6).
+
+        Where a way begins at such a stop, the link lies on its other flank, and stays
+        there until its drive has crossed the gap.
+
+        Args:
+            cell: The arm, its play as wide as its gaps.
+            width: Gaps over which joints go from flank to flank, (6,).
+        """
+        ways, arm = self.ways, cell.arm
+        fast = find_fast_stops(self.cycle)[ways.source]
+        chained = np.append(False, ways.source[1:] == ways.visit[:-1])
+        own = ~chained | any_in_rows(fast)
+        at = ways.first[:-1][own]
+        side = np.where(fast[own], -self.side[at], self.side[at])
+        begins = np.zeros(len(ways.q), dtype=bool)
+        begins[at] = True
+        z = ways.q[at] @ arm.coupling.T - side * half_width(arm)
+        play = PlayOperator(z, z)
+        sides, _ = sides_along(arm, ways.q, begins, play, width * self.half)
+        return on_the_way(sides, width)
+
     @cached_property
     def side(self) -> Floats:
         """Where each joint lies in its play, the middle of what is known, (s, 6)."""
@@ -86,6 +112,20 @@ class AlongWays:
             np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
         )
         return np.asarray(moved > CHANGED)
+
+
+def find_fast_stops(cycle: ProgramCycle) -> Bools:
+    """Return which joints may arrive fast at which visits, (n, 6).
+
+    That is where a JOINT move ends, and its slowest joint sets how fast others turn.
+    """
+    arm, targets, source = cycle.arm, cycle.targets, cycle.ways[1]
+    turned = np.abs((cycle.path.q - cycle.path.q[source]) @ arm.coupling.T)
+    lasts = turned / arm.velocity  # [s] at full speed
+    longest = np.maximum(lasts.max(axis=1, initial=0.0), 1e-12)
+    share = lasts * (targets.override / longest)[:, None]
+    stops = (targets.move == Motion.JOINT) & ~targets.fly & (source >= 0)
+    return np.asarray(stops[:, None] & (share > SLOW))
 
 
 @dataclass(frozen=True)

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.compensation.paths.flank_cases import FlankCase, Key
-from postproc.compensation.paths.path_error import PathAccuracy
+from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.compensation.paths.flank_cases import Key
+from postproc.compensation.paths.path_error import PathAccuracy, largest_in
 from postproc.compensation.paths.plan_rule import (
     PlanOutcome,
     choose_plan,
     negligible,
     tolerable_harm,
 )
-from postproc.model.flank_hypotheses import OPEN
+from postproc.model.flank_hypotheses import OPEN, FlankKind
 from postproc.robot.pose import MM
 
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
 
+TOGETHER = 256  # moves that are sorted in one table
 LAST = 1.0 - 1e-9  # share of a way that is still on it
-
-_Ways = Sequence[tuple[Floats, Floats]]
-"""Way (s,) and distance from the path (h, s) of the parts of a move [m]."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,15 @@ class Objection:
         """Return what would tell, "" where nothing is open."""
         if self.key is None:
             return ""
+        if self.key[1] is FlankKind.RAN_ON:
+            return SLOWER
         return MEASURE.format(joint=self.key[0])
 
 
+SLOWER = (
+    "Let the JOINT move before it end at 20 % of the speed of the joints or less, or "
+    "measure a path (diagnose --path)"
+)
 MEASURE = (
     "Measure how joint {joint} changes its flank: survey.reversals, or diagnose --path"
 )
@@ -73,6 +79,7 @@ class MoveOutcomes:
         keys: The hypotheses behind the first one, that all joints do as predicted.
         weight: (h,).
         tolerance: Of paths [m].
+        largest: How far the last plan leaves the path at the most, (h,) [m].
     """
 
     plans: tuple[PlanOutcome, ...]
@@ -80,6 +87,12 @@ class MoveOutcomes:
     keys: tuple[Key, ...]
     weight: Floats
     tolerance: float
+    largest: Floats
+
+    @property
+    def worst(self) -> float:
+        """Return how far the last plan leaves the path by any open hypothesis [m]."""
+        return float(self.largest[self.weight > OPEN].max())
 
     def choose(self) -> tuple[int, float]:
         """Choose a plan, see `choose_plan`; return it and its promise [m]."""
@@ -98,125 +111,254 @@ class MoveOutcomes:
         return Objection(float(worse[k]), float(self.share[plan, k]), key)
 
 
+class Predicted(NamedTuple):
+    """What predictions tell of the moves of a program with one plan.
+
+    Attributes:
+        paths: The predictions.
+        part: Which of them tells of each visit of the source, (n,).
+    """
+
+    paths: Sequence[PathAccuracy]
+    part: Ints
+
+
+Rows = tuple[int, ...]
+"""The visits of a move; of an arc both."""
+
+
 def compare(
-    plans: Sequence[PathAccuracy], rows: Sequence[int], tolerance: float
-) -> MoveOutcomes:
-    """Compare the plans of a move.
+    plans: Sequence[Predicted], moves: Sequence[Rows], tolerance: float
+) -> dict[Rows, MoveOutcomes]:
+    """Compare the plans of some moves.
 
     Args:
         plans: The program with each; the first one is without points.
-        rows: The visits of the move; of an arc both.
+        moves: The m moves.
         tolerance: Of paths [m].
     """
-    found = [_Move.of(paths, rows) for paths in plans]
-    usual = found[0]
-    steps = np.max([move.steps for move in found], axis=0)
-    small = negligible(steps, tolerance)
-    every = dict.fromkeys(key for move in found for key in move.cases)
-    keys = tuple(key for key in every if not small[key[0] - 1])
-    weights = {key: w for move in found for key, w in move.weights.items()}
-    usually = min((usual.usually[key[0] - 1] for key in keys), default=1.0)
-    weight = np.array([usually, *(weights[key] for key in keys)])
-    hypotheses = (None, *keys)
-    ways = [[*move.across(hypotheses)] for move in found]
-    outcomes, shares = zip(*(_outcome(own, ways[0]) for own in ways), strict=True)
-    if usually <= OPEN:  # it is what corrections are made for, and counts
-        weight[0] = np.nextafter(OPEN, 1.0)
-    return MoveOutcomes(outcomes, np.array(shares), keys, weight, tolerance)
+    if not len(moves):
+        return {}
+    found = [_PlannedMoves.of(plan, moves) for plan in plans]
+    keys = [*dict.fromkeys(key for ways in found for key in ways.cases)]
+    steps = np.max([ways.measure_steps() for ways in found], axis=0)
+    counts = ~np.array([negligible(own, tolerance) for own in steps])
+    there = np.ones((len(moves), 1 + len(keys)), dtype=bool)
+    for k, key in enumerate(keys, 1):
+        own = np.any([ways.has(key) for ways in found], axis=0)
+        there[:, k] = own & counts[:, key[0] - 1]
+    off, worse, share = np.zeros((3, len(plans), *there.shape))
+    largest = np.zeros(there.shape)
+    for k, hypothesis in enumerate([None, *keys]):
+        rows = np.flatnonzero(there[:, k])
+        for p, ways in enumerate(found if len(rows) else ()):
+            off[p, rows, k] = ways.measure_off(hypothesis, rows)
+            if p:
+                harm = ways.measure_harm(found[0], hypothesis, rows)
+                worse[p, rows, k], share[p, rows, k] = harm
+        largest[rows, k] = found[-1].measure_largest(hypothesis, rows)
+    weight = _weigh(found, keys, there)
+    return {
+        rows: MoveOutcomes(
+            tuple(map(PlanOutcome, off[:, m, own], worse[:, m, own])),
+            share[:, m, own],
+            tuple(keys[k - 1] for k in np.flatnonzero(own)[1:]),
+            weight[m, own],
+            tolerance,
+            largest[m, own],
+        )
+        for m, (rows, own) in enumerate(zip(moves, there, strict=True))
+    }
+
+
+def _weigh(found: Sequence[_PlannedMoves], keys: Sequence[Key], there: Bools) -> Floats:
+    """Return the weights of hypotheses, (m, h), that of what is predicted first.
+
+    Args:
+        found: The moves with all plans.
+        keys: The hypotheses behind the first one.
+        there: Where they make a difference, (m, h).
+    """
+    weights = {key: w for ways in found for key, w in ways.weights.items()}
+    weight = np.tile([1.0, *(weights[key] for key in keys)], (len(there), 1))
+    for k, key in enumerate(keys, 1):
+        own = there[:, k]
+        weight[own, 0] = np.minimum(weight[own, 0], found[0].usually[key[0] - 1])
+    closed = weight[:, 0] <= OPEN  # it is what corrections are made for, and counts
+    weight[closed, 0] = np.nextafter(OPEN, 1.0)
+    return weight
 
 
 @dataclass(frozen=True)
-class _Move:
-    """One move with one plan.
+class _PlannedMoves:
+    """The ways of m moves with one plan, s samples in all.
 
     Attributes:
-        paths: The program.
-        parts: The samples of the move; of an arc of both halves.
-        cases: The cases that make a difference on it.
+        way: Path length since each way began, (s,) [m]; an arc has two ways.
+        across: Distance from the path as predicted, (s,) [m].
+        first: The samples of way w are first[w] .. first[w + 1] - 1.
+        begin: The ways of move k are begin[k] .. begin[k + 1] - 1, (m + 1,).
+        cases: Samples at which hypotheses make a difference, distances from the path
+            there [m], and how far the TCP is from where it is predicted [m].
+        weights: Of the hypotheses.
         usually: Weight of what is predicted, of every joint, (6,).
     """
 
-    paths: PathAccuracy
-    parts: tuple[slice, ...]
-    cases: Mapping[Key, FlankCase]
+    way: Floats
+    across: Floats
+    first: Ints
+    begin: Ints
+    cases: Mapping[Key, tuple[Ints, Floats, Floats]]
+    weights: Mapping[Key, float]
     usually: Floats
 
     @classmethod
-    def of(cls, paths: PathAccuracy, rows: Sequence[int]) -> _Move:
-        parts = tuple(map(paths.samples_to, rows))
-        cases: Mapping[Key, FlankCase] = {}
-        usually = np.ones(6)
-        if paths.cases is not None:
-            usually = paths.cases.usually
-            cases = paths.cases.on_moves([paths.row_of(v) for v in rows])
-        return cls(paths, parts, cases, usually)
+    def of(cls, plan: Predicted, moves: Sequence[Rows]) -> _PlannedMoves:
+        visits = np.array([v for rows in moves for v in rows])
+        number = plan.part[visits]
+        own = [plan.paths[k].samples_to(v) for k, v in zip(number, visits, strict=True)]
+        start, stop = np.array([(rows.start, rows.stop) for rows in own]).T
+        count = stop - start
+        first = np.append(0, np.cumsum(count))
+        way, across = np.empty((2, first[-1]))
+        told = dict[Key, list[tuple[Ints, Floats, Floats]]]()
+        weights, usually = dict[Key, float](), np.ones(6)
+        for k in np.unique(number).tolist():
+            paths, mine = plan.paths[k], number == k
+            here, there = (spans(at[mine], count[mine]) for at in (first[:-1], start))
+            way[here], across[here] = paths.way[there], paths.after.across[there]
+            if paths.cases is None:
+                continue
+            usually, place = paths.cases.usually, np.full(len(paths.way), -1)
+            place[there] = here
+            for key, case in paths.cases.by_key.items():
+                at = place[case.rows]
+                if (hit := at >= 0).any():
+                    one = at[hit], case.across[hit], case.moved[hit]
+                    told.setdefault(key, []).append(one)
+                    weights[key] = case.weight
+        cases = {}
+        for key, some in told.items():
+            at, far, moved = map(np.concatenate, zip(*some, strict=True))
+            cases[key] = at, far, moved
+        begin = np.cumsum([0, *map(len, moves)])
+        return cls(way, across, first, begin, cases, weights, usually)
 
-    @property
-    def weights(self) -> dict[Key, float]:
-        return {key: case.weight for key, case in self.cases.items()}
+    def has(self, key: Key) -> Bools:
+        """Return on which moves a hypothesis makes a difference, (m,)."""
+        out = np.zeros(len(self.begin) - 1, dtype=bool)
+        if key in self.cases:
+            out[self._moves_at(self.cases[key][0])] = True
+        return out
 
-    @property
-    def steps(self) -> Floats:
-        """How far each joint moves the TCP under its worst hypothesis, (6,) [m]."""
-        found = np.zeros(6)
-        for (joint, _, _), case in self.cases.items():
-            for part in self.parts:
-                moved = case.moved[case.within(part)].max(initial=0.0)
-                found[joint - 1] = max(found[joint - 1], moved)
-        return found
+    def measure_steps(self) -> Floats:
+        """Return how far each joint moves the TCP at the most, (m, 6) [m]."""
+        out = np.zeros((len(self.begin) - 1, 6))
+        for (joint, _, _), (samples, _, moved) in self.cases.items():
+            np.maximum.at(out[:, joint - 1], self._moves_at(samples), moved)
+        return out
 
-    def across(self, keys: Sequence[Key | None]) -> Iterator[tuple[Floats, Floats]]:
-        """Yield way (s,) and distance from the path (h, s) of its parts [m].
+    def measure_off(self, key: Key | None, moves: Ints) -> Floats:
+        """Return what 95 % of the way of some moves stays within, (k,) [m]."""
+        far, found = self._distances(key), [np.empty(0)]
+        for k in range(0, len(moves), TOGETHER):
+            begin, end = (self._ends[moves[k : k + TOGETHER] + one] for one in (0, 1))
+            samples = begin[:, None] + np.arange(int((end - begin).max()))
+            behind = samples >= end[:, None]
+            samples[behind] = 0
+            off = np.where(behind, np.inf, far[samples])
+            order = np.argsort(off, axis=1)
+            step = np.where(behind, 0.0, self._step[samples])
+            done = np.cumsum(np.take_along_axis(step, order, axis=1), axis=1)
+            place = (done < ALONG * done[:, -1:]).sum(axis=1)
+            rows = np.arange(len(off))
+            found.append(off[rows, order[rows, place]])
+        return np.concatenate(found)
+
+    def measure_harm(
+        self, usual: _PlannedMoves, key: Key | None, moves: Ints
+    ) -> tuple[Floats, Floats]:
+        """Return how much farther moves are off than without points [m], and where.
 
         Args:
-            keys: The h hypotheses, None if all joints do as predicted.
+            usual: The moves without points.
+            key: The hypothesis; None: all joints do as predicted.
+            moves: Some of the moves, (k,).
+
+        Returns:
+            (k,), and a part of the move, from 0, and a share of its way, (k,).
         """
-        for part in self.parts:
-            far = np.tile(self.paths.after.across[part], (len(keys), 1))
-            for row, key in zip(far, keys, strict=True):
-                case = None if key is None else self.cases.get(key)
-                if case is not None:
-                    own = case.within(part)
-                    row[case.rows[own] - part.start] = case.across[own]
-            yield self.paths.way[part], far
+        parts = np.diff(self.begin)[moves]
+        ways = spans(self.begin[moves], parts)
+        more, place = self._farther(
+            usual, key, ways, ways == np.repeat(self.begin[moves], parts)
+        )
+        worst, at = np.zeros((2, len(moves)))
+        first = np.cumsum(parts) - parts
+        for k in range(int(parts.max())):
+            own = np.flatnonzero(parts > k)
+            far, there = more[first[own] + k], place[first[own] + k]
+            larger = far > worst[own]
+            at[own[larger]], worst[own[larger]] = k + there[larger], far[larger]
+        return worst, at
 
+    def _farther(
+        self, usual: _PlannedMoves, key: Key | None, ways: Ints, leads: Bools
+    ) -> tuple[Floats, Floats]:
+        """Return how much farther ways are off than usual, and at which share.
 
-def _outcome(own: _Ways, usual: _Ways) -> tuple[PlanOutcome, Floats]:
-    """Return how a plan does under h hypotheses, and where it is worst, (h,).
+        Where a move begins, what the whole of its way is off usually counts.
 
-    Where a move begins, what the whole of it is off without points counts there.
+        Args:
+            usual: The moves without points.
+            key: The hypothesis.
+            ways: Some ways, (w,).
+            leads: Which of them begin a move, (w,).
+        """
+        (samples, own, first), (old, there, start) = (
+            one._samples_of(ways) for one in (self, usual)
+        )
+        before, apart = usual._distances(key)[old], 1.0 + float(usual.way[old].max())
+        end = usual.way[usual.first[ways + 1] - 1]
+        here = np.minimum(self.way[samples], end[own]) + apart * own
+        usually = np.interp(here, usual.way[old] + apart * there, before)
+        begins = (self.way[samples] < BEGINS) & leads[own]
+        usually[begins] = np.maximum.reduceat(before, start)[own[begins]]
+        more = self._distances(key)[samples] - usually
+        top = largest_in(more, own, first)
+        whole = np.maximum(self.way[self.first[ways + 1] - 1], 1e-12)
+        return more[top], np.minimum(self.way[samples[top]] / whole, LAST)
 
-    Args:
-        own: The parts of the move with the plan, see `_Move.across`.
-        usual: .. and without points; the same if the plan has none.
-    """
-    worst, at = np.zeros((2, len(own[0][1])))
-    rows = np.arange(len(worst))
-    for k, ((way, far), (old, before)) in enumerate(zip(own, usual, strict=True)):
-        if own is usual:
-            break
-        usually = np.array([np.interp(way, old, row) for row in before])
-        if k == 0:
-            usually[:, way < BEGINS] = before.max(axis=1)[:, None]
-        more = far - usually
-        top = more.argmax(axis=1)
-        share = np.minimum(way[top] / max(way[-1], 1e-12), LAST)
-        at = np.where(more[rows, top] > worst, k + share, at)
-        worst = np.maximum(worst, more[rows, top])
-    length = np.concatenate([np.diff(way, prepend=0.0) for way, _ in own])
-    far = np.concatenate([part for _, part in own], axis=1)
-    return PlanOutcome(_within(far, length), worst), at
+    def measure_largest(self, key: Key | None, moves: Ints) -> Floats:
+        """Return the largest distance of some moves from their paths, (k,) [m]."""
+        largest = np.maximum.reduceat(self._distances(key), self._ends[:-1])
+        return np.asarray(largest[moves])
 
+    def _samples_of(self, ways: Ints) -> tuple[Ints, Ints, Ints]:
+        """Return the samples of ways, whose each is, and where those of each begin."""
+        count = np.diff(self.first)[ways]
+        samples = spans(self.first[ways], count)
+        return samples, np.repeat(np.arange(len(ways)), count), np.cumsum(count) - count
 
-def _within(far: Floats, length: Floats) -> Floats:
-    """Return the distance that 95 % of a way stays within, (h,) [m].
+    def _distances(self, key: Key | None) -> Floats:
+        """Return the distances from the paths under a hypothesis, (s,) [m]."""
+        if key is None or key not in self.cases:
+            return self.across
+        out, (samples, across, _) = np.array(self.across), self.cases[key]
+        out[samples] = across
+        return out
 
-    Args:
-        far: Distances at s samples, (h, s) [m].
-        length: Of the way up to each, (s,) [m].
-    """
-    order = np.argsort(far, axis=1)
-    done = np.cumsum(length[order], axis=1)
-    place = (done < ALONG * done[:, -1:]).sum(axis=1)
-    rows = np.arange(len(far))
-    return np.asarray(far[rows, order[rows, place]])
+    def _moves_at(self, samples: Ints) -> Ints:
+        return np.searchsorted(self._ends, samples, side="right") - 1
+
+    @cached_property
+    def _ends(self) -> Ints:
+        """Where the samples of each move begin, and the last ones end, (m + 1,)."""
+        return self.first[self.begin]
+
+    @cached_property
+    def _step(self) -> Floats:
+        """Way from the sample before to each, (s,) [m]."""
+        step = np.diff(self.way, prepend=0.0)
+        step[self.first[:-1]] = 0.0
+        return step

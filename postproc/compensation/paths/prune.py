@@ -20,7 +20,12 @@ from postproc.compensation.paths.changed_windows import Part
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.path_error import apart, sizes_of
-from postproc.compensation.paths.plan_outcomes import MoveOutcomes, Objection, compare
+from postproc.compensation.paths.plan_outcomes import (
+    MoveOutcomes,
+    Objection,
+    Rows,
+    compare,
+)
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
 from postproc.language.visits import Visits
@@ -54,9 +59,9 @@ def judge(now: PathPrediction) -> PathPrediction:
 def _find_bad(
     now: PathPrediction, without: dict[int, float]
 ) -> tuple[PathPrediction, dict[int, Removal], set[int]]:
-    """Find what must go: in changed windows first, and in the whole if nothing there.
+    """Find what must go; where nothing must, write the program.
 
-    A whole that comes out as its windows did is not judged again.
+    It is judged again only if it does not come out as its windows did.
 
     Args:
         now: The program.
@@ -72,7 +77,7 @@ def _find_bad(
         if bad or anew or now.written:
             return now, bad, anew
         now, alone = now.whole(), now
-        if now.agrees_with(alone):
+        if now.parts is alone.parts:
             return now, {}, set()
 
 
@@ -98,7 +103,7 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
 
 def _try_plans(
     now: PathPrediction,
-) -> Iterator[tuple[tuple[int, ...], MoveOutcomes, list[InsertionPlan]]]:
+) -> Iterator[tuple[Rows, MoveOutcomes, list[InsertionPlan]]]:
     """Yield every move with points, how it does without and by some plans, and these.
 
     Half is looked at where nothing else keeps the finest promise.
@@ -106,29 +111,29 @@ def _try_plans(
     task, made = now.task, [now]
     if now.plan.stops:
         made.append(task.predict(now.plan.without_stops()))
-    moves = {rows: _compare_plans(made, rows) for rows in _moves_with_points(now)}
-    finest, halved = resolution(task.tolerance), dict[tuple[int, ...], MoveOutcomes]()
+    moves = _compare_plans(made, _moves_with_points(now))
+    finest, halved = resolution(task.tolerance), dict[Rows, MoveOutcomes]()
     if any(flank.open_kinds for flank in task.flanks):
         open_ = [rows for rows, own in moves.items() if own.choose()[1] > finest]
         plain = made[-1].plan
         own = plain.points.keys() & {v for rows in open_ for v in rows}
         made.append(task.predict(replace(plain, halved=frozenset(own))))
-        halved = {rows: _compare_plans(made, rows) for rows in open_}
+        halved = _compare_plans(made, open_)
     plans = [one.plan for one in made]
     for rows, compared in moves.items():
         yield rows, halved.get(rows, compared), plans
 
 
 def _compare_plans(
-    made: Sequence[PathPrediction], rows: tuple[int, ...]
-) -> MoveOutcomes:
-    """Compare no points on a move with what some plans put there."""
+    made: Sequence[PathPrediction], moves: Sequence[Rows]
+) -> dict[Rows, MoveOutcomes]:
+    """Compare no points on moves with what some plans put there."""
     task = made[0].task
-    paths = [one.part_of(rows[0]).paths for one in made]
-    return compare((task.first.paths, *paths), rows, task.tolerance)
+    plans = [one.predicted for one in (task.predict(InsertionPlan()), *made)]
+    return compare(plans, moves, task.tolerance)
 
 
-def _moves_with_points(now: PathPrediction) -> list[tuple[int, ...]]:
+def _moves_with_points(now: PathPrediction) -> list[Rows]:
     """Return the visits of every move with points, of arcs both."""
     return sorted({halves(now.task.visits, v) for v in now.plan.points})
 
@@ -239,9 +244,8 @@ def _harmful(
 def _objections(now: PathPrediction) -> dict[int, Objection]:
     """Say which hypotheses make moves with points worse, and at what share."""
     found = dict[int, Objection]()
-    for rows in _moves_with_points(now):
-        objection = _compare_plans((now,), rows).objection(1)
-        if objection is not None:
+    for rows, compared in _compare_plans((now,), _moves_with_points(now)).items():
+        if (objection := compared.objection(1)) is not None:
             found[rows[int(objection.place)]] = objection
     return found
 

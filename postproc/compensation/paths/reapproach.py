@@ -10,10 +10,10 @@ from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.approach_advice import place_to_approach
 from postproc.compensation.findings import SURE
 from postproc.compensation.outcome import Status
+from postproc.compensation.paths.gathered import take_visits
 from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,
     PathPrediction,
-    of_source,
 )
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.write_points import numbers_at
@@ -32,7 +32,7 @@ def insert_reapproaches(now: PathPrediction) -> PathPrediction:
     ends = (visits.motion.kind == Motion.LINEAR) & ~visits.motion.fly
     ends &= ~visits.motion.fly[visits.graph.before]
     places = dict(plan.approaches)
-    for v in np.flatnonzero(ends & _find_uncertain(task.source.kept)).tolist():
+    for v in np.flatnonzero(ends & _find_uncertain(task.kept)).tolist():
         file, line = int(visits.place.file[v]), int(task.lines[v])
         may = not task.find_hindrance(v) and task.splitter.stops(file, line)
         if may and len(places) < room:
@@ -67,7 +67,7 @@ def _worse_paths(now: PathPrediction) -> set[int]:
 def _place_to_approach(task: InsertionTask, v: int) -> Floats | None:
     """Find the numbers of a stop from which to approach a target."""
     cell, cycle = task.setting.cell, task.first.before
-    visits, side = task.visits, task.source.kept.decisions.side
+    visits, side = task.visits, task.kept.decisions.side
     q = place_to_approach(
         cell.arm, cycle, v, int(visits.graph.before[v]), np.abs(side[v]) < SURE,
         cell.limits.reapproach_mm * MM,
@@ -85,10 +85,10 @@ def _find_uncertain(kept: WindowResult) -> Bools:
 
 def bad_approaches(now: PathPrediction) -> set[int]:
     """Find the targets that are approached anew and are no better for it."""
-    kept = of_source(now.program.kept, now.own)
+    kept = take_visits(now.program.kept, now.own)
     unsure, status = _find_uncertain(kept), kept.decisions.status
     stops = now.program.kept.decisions.status[now.own - 1]
-    others = np.flatnonzero(unsure & ~_find_uncertain(now.task.source.kept))
+    others = np.flatnonzero(unsure & ~_find_uncertain(now.task.kept))
     asked = np.array(sorted(now.plan.approaches), dtype=np.int64)
     bad = (
         unsure[asked]

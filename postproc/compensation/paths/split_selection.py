@@ -54,7 +54,7 @@ def find_split(now: PathPrediction) -> InsertionPlan:
 
 def _list_far(now: PathPrediction) -> set[int]:
     """List the moves that are left too far, or most of whose way is not near enough."""
-    paths, tolerance = now.in_time.paths, now.task.tolerance
+    paths, tolerance = now.parts[0].paths, now.task.tolerance
     step = np.diff(paths.way, prepend=0.0)
     step[paths.first[:-1]] = 0.0
     far = np.where(paths.after.across > tolerance / 2, step, 0.0)

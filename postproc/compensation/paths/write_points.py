@@ -116,6 +116,7 @@ def _edits(
 ) -> list[list[Edit]]:
     """Write the points, and the stops before targets, file by file in their order."""
     visits, found = reading.visits, [list[Edit]() for _ in reading.sources]
+    on_lines = _points_of_lines(visits, put)
     for visit in sorted({*put.points, *put.approaches}):
         config = visits.target.configs[visits.target.config[visit]]
         file, line = int(visits.place.file[visit]), int(lines[visit])
@@ -130,21 +131,29 @@ def _edits(
             arc = CutArc.of(visits, put.points, visit, put.chords, turns, put.joints)
             pieces, via = arc.pieces()
             found[file] += splitter.arc(file, line, pieces, via, config, stops)
-        elif not is_arc(visits, visit):
-            numbers = _points_of_line(visits, visit, put)
+        elif visit in on_lines:
+            numbers = on_lines[visit]
             found[file].append(splitter.points(file, line, numbers, config, stops))
     return [sorted(own, key=lambda edit: edit.span) for own in found]
 
 
-def _points_of_line(visits: Visits, visit: int, put: PathPoints) -> Floats:
-    """Write the numbers of the points on a line, turned as they are to be, (k, w)."""
-    share = np.array(put.points[visit])
-    numbers = between(visits, visit, share)
+def _points_of_lines(visits: Visits, put: PathPoints) -> dict[int, Floats]:
+    """Write the numbers of the points on lines, turned as they are to be, (k, w)."""
+    lines = [v for v in put.points if not is_arc(visits, v)]
+    if not lines:
+        return {}
+    shares = [np.array(put.points[v]) for v in lines]
+    count = [len(share) for share in shares]
+    numbers = between(visits, np.repeat(lines, count), np.concatenate(shares))
     if put.joints is not None:
-        numbers = visits.dialect.count_flags(numbers, put.joints(visit, share))
+        q = [put.joints(v, share) for v, share in zip(lines, shares, strict=True)]
+        numbers = visits.dialect.count_flags(numbers, np.concatenate(q))
     tool = visits.dialect.poses(numbers)[:, :3, :3]
-    axis = np.einsum("kij,kj->ki", tool, put.turns(visit))
-    return visits.dialect.rotate(numbers, rotation_from_vector(axis))
+    turn = np.concatenate([put.turns(v) for v in lines])
+    axis = np.einsum("kij,kj->ki", tool, turn)
+    numbers = visits.dialect.rotate(numbers, rotation_from_vector(axis))
+    parts = np.split(numbers, np.cumsum(count)[:-1])
+    return dict(zip(lines, parts, strict=True))
 
 
 def lines_in_files(reading: ParsedProgram, cell: Cell) -> Ints:
@@ -156,24 +165,25 @@ def lines_in_files(reading: ParsedProgram, cell: Cell) -> Ints:
     ).visits.place.line
 
 
-def between(visits: Visits, visit: int, share: Floats) -> Floats:
-    """Write points on the line that leads to a visit.
+def between(visits: Visits, visit: Ints | int, share: Floats) -> Floats:
+    """Write points on the lines that lead to visits.
 
     The tool turns about one axis that stands still.
 
     Args:
         visits: The program.
-        visit: Where the line ends.
+        visit: Where the line ends, or that of each point, (k,).
         share: Of the way, (k,).
 
     Returns:
         Their numbers, (k, w).
     """
-    ends = visits.target.values[[visits.graph.before[visit], visit]]
-    turn = visits.dialect.poses(ends)[:, :3, :3]
-    axis = rotation_vector((turn[1] @ turn[0].T)[None])[0]
-    out = np.tile(ends[0], (len(share), 1))
-    out[:, :3] += share[:, None] * (ends[1, :3] - ends[0, :3])
+    end = np.broadcast_to(visit, share.shape)
+    old, new = (visits.target.values[at] for at in (visits.graph.before[end], end))
+    turn, other = (visits.dialect.poses(values)[:, :3, :3] for values in (old, new))
+    axis = rotation_vector(other @ np.swapaxes(turn, 1, 2))
+    out = np.array(old)
+    out[:, :3] += share[:, None] * (new - old)[:, :3]
     return visits.dialect.rotate(out, rotation_from_vector(share[:, None] * axis))
 
 

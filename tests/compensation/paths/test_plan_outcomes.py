@@ -10,7 +10,8 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
-from postproc.compensation.paths.plan_outcomes import BEGINS, compare
+from postproc.compensation.paths.plan_outcomes import BEGINS, MoveOutcomes, Predicted
+from postproc.compensation.paths.plan_outcomes import compare as compare_moves
 from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint
 from postproc.robot.pose import MM
 
@@ -38,6 +39,12 @@ def program(off: float, *cases: FlankCase) -> Any:
     )  # fmt: skip
 
 
+def compare(plans: tuple[Any, ...], rows: tuple[int], most: float) -> MoveOutcomes:
+    """Compare the plans of one move."""
+    told = [Predicted([plan], np.zeros(8, dtype=np.int64)) for plan in plans]
+    return compare_moves(told, [rows], most)[rows]
+
+
 def case(joint: int, first: int, last: int, off: float, moved: float) -> FlankCase:
     rows = np.arange(first, last)
     far = np.full(len(rows), off * MM)
@@ -56,6 +63,7 @@ def test_harm_is_counted_place_by_place_and_named() -> None:
     )
     assert "how joint 3 changes its flank" in objection.cure
     assert found.choose() == (0, pytest.approx(0.1 * MM))
+    assert found.worst == pytest.approx(0.2 * MM)
     assert found.objection(0) is None
 
 
