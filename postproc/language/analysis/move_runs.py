@@ -90,8 +90,8 @@ def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
 def within(counts: Ints) -> tuple[Indices, Indices]:
     """Return of each of all that are counted: whose it is, and its place there.
 
-    >>> within(np.array([1, 3]))
-    (array([0, 1, 1, 1]), array([0, 0, 1, 2]))
+    >>> [column.tolist() for column in within(np.array([1, 3]))]
+    [[0, 1, 1, 1], [0, 0, 1, 2]]
     """
     owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
     begin = (np.cumsum(counts) - counts).astype(np.int32)
