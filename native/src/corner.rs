@@ -25,6 +25,11 @@ pub struct Zones<'py> {
     behind: PyReadonlyArray1<'py, f64>,
 }
 
+/// Tell whether a bend is so small that moves are as good as straight.
+pub fn is_flat(bend: &Six) -> bool {
+    bend.iter().all(|bend| bend.abs() < FLAT)
+}
+
 /// Two moves that are superposed.
 #[derive(Clone)]
 pub struct Corner<'a> {
@@ -76,7 +81,7 @@ impl Corner<'_> {
         if self.into.count() != 1 || self.out.count() != 1 {
             return false;
         }
-        let (into, out) = (self.into.turns().1, self.out.turns().0);
+        let (into, out) = (self.into.turn(), self.out.turn());
         let turned = |drive: &Six, turns: &Six| -> f64 {
             drive.iter().zip(turns).map(|(share, turn)| share * turn).sum()
         };
@@ -163,7 +168,7 @@ impl<'a, 'b> Group<'a, 'b> {
         for (bend, corner) in bend.iter_mut().zip(self.corners.iter()) {
             *bend = corner.bend();
         }
-        let bent = bend.map(|own| own.iter().any(|b| b.abs() >= FLAT || b.is_nan()));
+        let bent = bend.map(|own| !is_flat(&own));
         if bent.contains(&true) {
             let refined = self.refined(nearest);
             nearest = std::array::from_fn(|k| if bent[k] { refined[k] } else { nearest[k] });

@@ -83,11 +83,9 @@ impl Way<'_> {
         self.samples.len()
     }
 
-    /// Tell what joints turn by up to the first sample, and from the begin to the end.
-    pub fn turns(&self) -> (Six, Six) {
-        let (first, last) = (&self.samples[0], &self.samples[self.samples.len() - 1]);
-        let from = |to: &Six| std::array::from_fn(|j| to[j] - self.from[j]);
-        (from(first), from(last))
+    /// Tell what joints turn by up to the first sample.
+    pub fn turn(&self) -> Six {
+        std::array::from_fn(|j| self.samples[0][j] - self.from[j])
     }
 
     /// Interpolate at the fraction u: straight, or a parabola through three samples.

@@ -4,11 +4,10 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2}
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use crate::corner::{Corner, Zones};
+use crate::corner::{is_flat, Corner, Zones};
 use crate::edges::{Edges, Paths, Way};
 use crate::rows::{array, each, flat, rows, same_length, Six};
 
-const FLAT: f64 = 4e-5; // [rad] bend below which a corner's moves are as good as straight
 const EMPTY: f64 = 1e-9; // part of a move between two zones that is nothing
 
 /// `Corners` of the package.
@@ -205,7 +204,7 @@ pub fn rounded<'py>(
         corners.push(Rounded {
             nearest: nearest[c],
             q: &passed[c],
-            flat: bend[c].iter().all(|bend| bend.abs() < FLAT),
+            flat: is_flat(&bend[c]),
             goes_on: drives.is_some_and(|drives| corner.goes_on(drives)),
             corner,
         });
