@@ -370,8 +370,8 @@ ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
 CORNERS = 3  # rounds that bend the way at all corners; later where it is far off alone
-NEAR = 1e-7  # [mm, deg] that numbers may be off where the way is looked at
 LAST = 2  # rounds of that behind the last one of other sides
+NEAR = 1e-7  # [mm, deg] that numbers may be off where the way is looked at
 
 
 @dataclass(frozen=True)
