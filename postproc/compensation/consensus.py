@@ -1,10 +1,9 @@
-"""What the windows of a program must agree on: their rounds, and what is at cuts."""
+"""What the windows of a program must agree on: all that was found at their cuts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -15,36 +14,7 @@ from postproc.diagnostics import Reason
 from postproc.robot.backlash_operator import PlayOperator
 from postproc.robot.direction import NO_SIDES, FlankState
 
-# Rounds of correcting and planning again are the same for a whole program.
-#
-# Whether there is another one, and of what kind, is asked of all its targets. A window
-# says what its own would have; all windows together say what is done, and one that did
-# otherwise, where that matters to it, is worked through again.
-
-
-class Step(IntEnum):
-    """What comes behind a look at a proposal, the least first."""
-
-    READ_BACK = 0  # nothing is left to do: look at the numbers as they are written
-    AIM = 1  # correct for other sides
-    BEND = 2  # .. and for what rounded points are missed by
-
-
-@dataclass(frozen=True)
-class RoundVote:
-    """What a window did in one round.
-
-    Attributes:
-        step: What it did.
-        vote: What its own targets would have.
-        moved, missed: It had targets with other sides, and rounded points that are
-            missed by anything, among its own and those that are watched beyond.
-    """
-
-    step: Step
-    vote: Step
-    moved: bool
-    missed: bool
+# What is looked at, round by round.
 
 
 @dataclass(frozen=True)
@@ -101,7 +71,7 @@ class Snapshot:
         return FlankState(self.side, PlayOperator(self.lo, self.hi))
 
 
-Look = tuple[int, bool]  # a round; whether at the numbers as they are written
+Look = tuple[int, bool]  # which one; whether at the numbers as they are written
 
 
 @dataclass(frozen=True)
@@ -141,21 +111,15 @@ class Glimpses:
 
 @dataclass
 class RoundLog:
-    """What a window did, and what was looked at at both of its ends.
+    """What was looked at at both ends of a window, round by round.
 
     Attributes:
-        own: Visits that vote.
         left, right: Visits that are watched.
-        pace: What to do in the first rounds, whatever the votes.
-        taken: What was done.
-        begin, end: What was looked at at `left` and `right`.
+        begin, end: What was looked at there.
     """
 
-    own: slice = field(default_factory=lambda: slice(None))
     left: slice = field(default_factory=lambda: slice(0, 0))
     right: slice = field(default_factory=lambda: slice(0, 0))
-    pace: Sequence[Step] = ()
-    taken: list[RoundVote] = field(default_factory=list)
     begin: dict[Look, Snapshot] = field(default_factory=dict)
     end: dict[Look, Snapshot] = field(default_factory=dict)
 
@@ -164,55 +128,6 @@ class RoundLog:
         for kept, rows in ((self.begin, self.left), (self.end, self.right)):
             if rows.stop > rows.start:
                 kept[look] = seen[rows]
-
-    def take(self, moved: Bools, missed: Floats, far: Bools) -> Step:
-        """Decide on the step behind a look.
-
-        Args:
-            moved: Targets to be corrected for other sides, (n,).
-            missed: What rounded points are missed by, (n, 3) [m].
-            far: Those that are missed by too much, (n,).
-        """
-        vote = Step.AIM if moved[self.own].any() else Step.READ_BACK
-        if far[self.own].any():
-            vote = Step.BEND
-        number = len(self.taken)
-        step = self.pace[number] if number < len(self.pace) else vote
-        near = self.near
-        taken = RoundVote(step, vote, bool(moved[near].any()), bool(missed[near].any()))
-        self.taken.append(taken)
-        return step
-
-    @property
-    def near(self) -> slice:
-        """Return its own visits and those that are watched.
-
-        What lies farther out is decided by the windows there: where that reaches the
-        watched ones, both windows at the cut find different things at them.
-        """
-        return slice(self.left.start, self.right.stop or None)
-
-
-def common(trails: Sequence[RoundLog]) -> tuple[Step, ...]:
-    """Say what all windows together do, round by round."""
-    number = max(len(trail.taken) for trail in trails)
-    return tuple(
-        max(t.taken[k].vote for t in trails if k < len(t.taken)) for k in range(number)
-    )
-
-
-def fits(trail: RoundLog, steps: Sequence[Step]) -> bool:
-    """Tell whether a window comes out as if it had done all steps."""
-    last = len(trail.taken) - 1
-    for number, own in enumerate(trail.taken[:-1]):
-        alike = own.step == steps[number]
-        both = min(own.step, steps[number]) >= Step.AIM
-        if not (alike or (both and not own.missed)):
-            return False
-    own, rest = trail.taken[-1], steps[last:]
-    if all(step == Step.READ_BACK for step in rest):
-        return True
-    return not own.moved and not (own.missed and Step.BEND in rest)
 
 
 # What both windows at a cut find at the visits beside it.

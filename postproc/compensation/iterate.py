@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count, pairwise
+from itertools import count
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from postproc.compensation.consensus import (
     Look,
     RoundLog,
     Snapshot,
-    Step,
     lead_of,
 )
 from postproc.compensation.decisions import (
@@ -81,23 +80,22 @@ class SecantSearch:
         """Start without a history."""
         self._aim: Floats | None = None
         self._found: Floats | None = None
-        self._rounds = 0
         self._flanked: Bools = np.zeros((1, 1), dtype=bool)
 
-    def next_aim(self, aim: Floats, found: Floats) -> Floats:
+    def next_aim(self, aim: Floats, found: Floats, number: int) -> Floats:
         """Give the sides to aim for next, (n, 6).
 
         Args:
             aim: Sides that the targets are corrected for, (n, 6).
             found: Sides that joints then arrive at, (n, 6).
+            number: The round.
         """
         step = found - aim
-        if self._rounds >= SECANTS:
+        if number >= SECANTS:
             step = step / 2
         elif self._aim is not None and self._found is not None:
             step = self._secant(step, aim - self._aim, found - self._found)
         self._aim, self._found = np.array(aim), np.array(found)
-        self._rounds += 1
         return np.clip(aim + step, -1.0, 1.0)
 
     def _secant(self, step: Floats, shift: Floats, answer: Floats) -> Floats:
@@ -214,12 +212,11 @@ class Iteration:
         return departure(arm, old, new, tool, setting.offset)
 
     def next_aim(
-        self, current: SolverState, moved: Bools, found: Floats, search: SecantSearch
+        self, current: SolverState, moved: Bools, sides: Floats
     ) -> SolverState:
-        """Correct some targets for other sides, by those that were found."""
+        """Correct some targets for other sides."""
         setting = self.setting
         with setting.clock("solve"):
-            sides = search.next_aim(current.solved.direction, found)
             states = self.states.with_(direction=sides)
             solved = solve_again(
                 current.solved, moved, setting.model, setting.cell, self.planned,
@@ -250,9 +247,9 @@ class Iteration:
         return wanted
 
     def measure_misses(
-        self, proposal: Proposal, aside: Floats, meant: Floats
-    ) -> tuple[Floats, Bools]:
-        """Say by what targets miss theirs, (n, 3) [m], and where by too much, (n,).
+        self, proposal: Proposal, aside: Floats, meant: Floats, number: int
+    ) -> Floats:
+        """Say by what targets miss theirs and are to be bent, (n, 3) [m].
 
         Where the original path is as good as straight, only what is too much counts: a
         correction bends it where a joint reverses.
@@ -261,20 +258,16 @@ class Iteration:
             proposal: Tells which targets can make up for it.
             aside: From targets to where the path passes them, (n, 3) [m].
             meant: .. to where it should.
+            number: The round.
         """
         flown = self.reading.visits.motion.fly & proposal.corrected
         missed = np.where(flown[:, None], aside - meant, 0.0)
         missed[any_in_rows(np.isnan(missed))] = 0.0
-        far = any_in_rows(np.abs(missed) > CLOSE)
-        bent = np.array(far)
-        bent[self.planned.plan.pull.visit] = True
-        missed[~bent] = 0.0
-        begins = self.reading.begins
-        if len(begins) > 1:  # those with a point that is not hit go on alone
-            for first, end in pairwise((*begins, len(missed))):
-                if not far[first:end].any():
-                    missed[first:end] = 0.0
-        return missed, far
+        allowed = np.full(len(missed), CLOSE if number < ROUNDS + LAST else np.inf)
+        if number < CORNERS:
+            allowed[self.planned.plan.pull.visit] = FINE
+        missed[largest_in_rows(np.abs(missed)) <= allowed] = 0.0
+        return missed
 
     def find_limit_violations(
         self, proposal: Proposal, found: Converged | None
@@ -282,8 +275,8 @@ class Iteration:
         """Tell which targets must stay for the ways to or from them, (n,).
 
         Raises:
-            NotConcatenableError: There are some, in programs side by side.
-            NotAloneError: They are not among these, in a window of a program.
+            NotAloneError: They are not among these, in a window of a program, or
+                programs are side by side.
         """
         n = len(self.states)
         if found is None:
@@ -298,11 +291,9 @@ class Iteration:
         ends = with_origins(self.reading.visits, self.planned, ends)
         ends &= proposal.corrected
         if far.any() and not ends.any():  # by what came long before
-            if self.part:
+            if self.part or len(self.reading.begins) > 1:
                 raise NotAloneError
             ends = np.array(proposal.corrected)
-        if ends.any() and len(self.reading.begins) > 1:
-            raise NotConcatenableError
         return ends
 
 
@@ -370,6 +361,7 @@ ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
 CORNERS = 3  # rounds that bend the way at all corners; later where it is far off alone
+FINE = 1e-7  # [m] how well rounded fly points are hit by then
 LAST = 2  # rounds of that behind the last one of other sides
 NEAR = 1e-7  # [mm, deg] that numbers may be off where the way is looked at
 
@@ -391,11 +383,7 @@ FROM_START = Boundary()
 
 
 class NotAloneError(Exception):
-    """What comes of a window cannot be told from it alone."""
-
-
-class NotConcatenableError(Exception):
-    """A program goes on by rounds that others beside it did not take."""
+    """What comes of a window cannot be told from it alone, or of programs together."""
 
 
 @dataclass(frozen=True)
@@ -434,10 +422,12 @@ def iterate(
     A rounded fly point also moves with its neighbours' corrections, which its own makes
     up for, as long as sides change: where a joint reverses, a change of sides bends the
     corner anew. The last look is at the numbers as they will be read from the output.
+    Where it finds that targets must keep their values, the rounds begin anew behind
+    those that bend all corners.
 
-    Programs side by side do not wait for each other: what has come to rest in one stays
-    as it is while others go on. Only what the last look finds would come rounds later
-    than in a program alone, and how targets are settled depends on the round.
+    What becomes of a target depends on the targets near it alone, never on how long
+    others take: so windows of a program come out as the whole, and programs side by
+    side as each alone.
 
     Args:
         reading: The visits.
@@ -448,35 +438,32 @@ def iterate(
         trail: .. and what is kept of their rounds then.
 
     Raises:
-        NotConcatenableError: The last look found something in programs side by side.
         NotAloneError: What comes of a window cannot be told from it alone.
     """
     iteration = Iteration(reading, planned, states, setting, trail is not None)
     trail = RoundLog() if trail is None else trail
     replanner = Replanner(reading.visits, planned.targets, setting.cell, lead.begin)
     course = _Course(iteration, replanner, lead, trail)
-    search, current = SecantSearch(), iteration.first_aim()
-    for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
+    search, current, number = SecantSearch(), iteration.first_aim(), 0
+    for turn in count():  # ends: from round ROUNDS on, `settled` or `held` grows
         proposal, meant = iteration.propose(current)
-        looked = course.look((number, False), current, proposal)
+        looked = course.look((turn, False), current, proposal)
         most = SAME if number < ROUNDS else OTHER
         moved = current.find_flank_changes(proposal, looked.side, most)
-        missed, far = iteration.measure_misses(proposal, looked.aside, meant)
-        if number >= CORNERS:
-            missed[~far] = 0.0
-        step = trail.take(moved, missed, far & (number < ROUNDS + LAST))
-        if step == Step.READ_BACK:
-            found, flipped = _read_back(course, current, proposal, number)
+        missed = iteration.measure_misses(proposal, looked.aside, meant, number)
+        if not (moved.any() or missed.any()):
+            found, flipped = _read_back(course, current, proposal, turn)
             swung = iteration.find_limit_violations(proposal, found)
             if found is not None and not swung.any():
                 return found
             held, swung = current.held | flipped, current.swung | swung
             current = replace(current, held=held, swung=swung)
+            search, number = SecantSearch(), CORNERS
             continue
-        bent = current.bent + missed if step == Step.BEND else current.bent
         settled = current.settled | moved if number >= ROUNDS else current.settled
-        current = replace(current, bent=bent, settled=settled)
-        current = iteration.next_aim(current, moved, looked.side, search)
+        current = replace(current, bent=current.bent + missed, settled=settled)
+        sides = search.next_aim(current.solved.direction, looked.side, number)
+        current, number = iteration.next_aim(current, moved, sides), number + 1
     raise AssertionError("unreachable")
 
 
@@ -530,24 +517,19 @@ def _glimpse(current: SolverState, proposal: Proposal, found: Replanned) -> Snap
 
 
 def _read_back(
-    course: _Course, current: SolverState, proposal: Proposal, number: int
+    course: _Course, current: SolverState, proposal: Proposal, turn: int
 ) -> tuple[Converged | None, Bools]:
     """Write the numbers, and look at them as they will be read.
 
     Returns:
         What came of it, None where targets now come from another side; and those.
-
-    Raises:
-        NotConcatenableError: There are some, in programs side by side.
     """
     iteration = course.iteration
     setting = iteration.setting
     edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
-    last = course.look((number, True), current, proposal)
+    last = course.look((turn, True), current, proposal)
     flipped = current.find_flank_changes(proposal, last.side, OTHER)
     if flipped.any():
-        if len(iteration.reading.begins) > 1:
-            raise NotConcatenableError
         return None, flipped
     with setting.clock("solve"):
         model, cell = setting.model, setting.cell

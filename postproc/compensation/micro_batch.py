@@ -133,7 +133,7 @@ def correct_batch(
         What `correct` keeps of each alone.
 
     Raises:
-        NotConcatenableError: They would not come out as each alone.
+        NotAloneError: They would not come out as each alone.
     """
     own = [reading.visits for reading in readings]
     texts = tuple(text for reading in readings for text in reading.texts)

@@ -24,9 +24,6 @@ from postproc.compensation.clones import give_own_points
 from postproc.compensation.consensus import (
     Glimpses,
     RoundLog,
-    Step,
-    common,
-    fits,
     same_looks,
     same_rows,
 )
@@ -255,7 +252,7 @@ class Corrected:
     Attributes:
         window: The window.
         kept: What is kept of its own visits.
-        trail: The rounds that it took.
+        trail: What was looked at at its ends.
         left: What came of the visits beside the cut before it.
         right: .. of those beside the cut behind, and of the next window's halo.
         exit: Where the arm stands at the first visit of that halo.
@@ -378,7 +375,6 @@ class _WindowWork:
         self,
         own: Window,
         before: Corrected | None,
-        pace: Sequence[Step],
         clock: Clock,
     ) -> Corrected:
         """Correct a window; see `parallel.Work`.
@@ -392,7 +388,7 @@ class _WindowWork:
         lead, arrived, doubtful = _lead(own, before)
         if before is None and own.begin:
             lead = replace(lead, begin=self._foretell(own.begin))
-        trail, after = self._trail(own, pace), self._after(own)
+        trail, after = self._watch(own), self._after(own)
         setting = self.setting.with_clock(clock)
         aims = self.reading.aims[own.begin : own.stop]
         part = replace(self.reading, visits=visits, aims=aims)
@@ -430,27 +426,19 @@ class _WindowWork:
         n = len(self.quiet)
         return cuts.window(self.quiet, own.end, n).begin if own.end < n else n
 
-    def _trail(self, own: Window, pace: Sequence[Step]) -> RoundLog:
+    def _watch(self, own: Window) -> RoundLog:
         """Say what is to be watched of a window."""
         first = max(own.first - cuts.BAND, own.begin)
         left = own.rows(first, min(own.first + cuts.BAND, own.stop))
         if own.first == 0:
             left = slice(0, 0)
         right = own.rows(self._after(own), min(own.end + cuts.BAND, own.stop))
-        return RoundLog(own.own, left, right, pace)
+        return RoundLog(left, right)
 
     def whole(self) -> list[Window]:
         """Return the program as one window."""
         n = len(self.quiet)
         return [Window(0, n, 0, n)]
-
-    def fits(self, found: Corrected, steps: Sequence[Step]) -> bool:
-        """Tell whether a window comes out as if it had taken these rounds."""
-        return fits(found.trail, steps)
-
-    def steps(self, found: Sequence[Corrected]) -> Sequence[Step]:
-        """Tell which rounds all windows together take."""
-        return common([part.trail for part in found])
 
     def joins(self, before: Corrected, after: Corrected) -> bool:
         """Tell whether two windows found the same at the cut between them."""

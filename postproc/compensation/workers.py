@@ -18,7 +18,6 @@ from traceback import format_exc
 from typing import IO, Any, NoReturn, Protocol, TypeVar
 
 from postproc.arrays import release_memory
-from postproc.compensation.consensus import Step
 from postproc.compensation.options import Clock, no_progress
 from postproc.exceptions import PostprocError
 from postproc.operating_system import (
@@ -176,18 +175,17 @@ def _receive(pipe: IO[bytes]) -> Iterator[Any]:
 
 # Windows of a program worked through by several processes, to the bytes of one window.
 #
-# A window depends on its neighbours in three ways. Forwards, over where the arm stands
-# at its beginning and what the joints remember: that is known from the window before. A
+# A window depends on its neighbours in two ways. Forwards, over where the arm stands at
+# its beginning and what the joints remember: that is known from the window before. A
 # process that works ahead foretells it from many targets before; the joints take up
 # their play within a few moves, and what was before is forgotten. Both ways, over what
-# acts on the targets next to it: that is what halos are for. And over rounds, of which
-# a program takes as many as any target needs. All of that is checked: at every cut the
-# windows before and behind must have found the same at the targets on both sides, round
-# by round, and must have taken rounds of the same kind. Whatever rule makes a target
-# depend on the ones next to it then holds at all targets, as in one window, so that the
-# result is that of one window. Where something does not agree, a window is worked
-# through again from what is known now; where that does not help, something reaches
-# farther than a halo, and the windows on both sides become one.
+# acts on the targets next to it: that is what halos are for. Both are checked: at every
+# cut the windows before and behind must have found the same at the targets on both
+# sides, round by round. Whatever rule makes a target depend on the ones next to it then
+# holds at all targets, as in one window, so that the result is that of one window.
+# Where something does not agree, a window is worked through again from what is known
+# now; where that does not help, something reaches farther than a halo, and the windows
+# on both sides become one.
 
 W = TypeVar("W")
 D = TypeVar("D")
@@ -199,29 +197,20 @@ MERGES = 8  # times that windows become one, before all of them do
 class Work(Protocol[W, D]):
     """What is done with windows W, each for a result D."""
 
-    def correct(
-        self, window: W, before: D | None, pace: Sequence[Step], clock: Clock
-    ) -> D:
+    def correct(self, window: W, before: D | None, clock: Clock) -> D:
         """Work through one window.
 
         Args:
             window: The window.
             before: What came of the one before; None: not known, or it is the first.
-            pace: The rounds to take.
             clock: Given the seconds.
         """
 
     def whole(self) -> list[W]:
         """Return the program as one window."""
 
-    def fits(self, found: D, steps: Sequence[Step]) -> bool:
-        """Tell whether a window comes out as if it had taken these rounds."""
-
     def joins(self, before: D, after: D) -> bool:
         """Tell whether two windows found the same at the cut between them."""
-
-    def steps(self, found: Sequence[D]) -> Sequence[Step]:
-        """Tell which rounds all windows together take."""
 
     def merge(self, windows: Sequence[W], cut: int) -> list[W]:
         """Make one window of those on both sides of a cut, and what goes on there."""
@@ -252,12 +241,12 @@ def in_processes(
         ]
         for window in own:
             before = found[-1] if found else None
-            found.append(work.correct(window, before, (), clock))
+            found.append(work.correct(window, before, clock))
         for part, made in zip(others, ahead, strict=True):
             for window, (done, stages) in zip(part, made, strict=True):
                 clock.add(stages)
                 if done is None:
-                    done = work.correct(window, found[-1], (), clock)
+                    done = work.correct(window, found[-1], clock)
                 found.append(done)
     return _join_windows(work, list(windows), found, clock)
 
@@ -286,7 +275,7 @@ def _work_ahead(
         clock = Clock(no_progress)
         if not lost:
             try:
-                before = work.correct(window, before, (), clock)
+                before = work.correct(window, before, clock)
             except Exception:
                 lost = True
         yield None if lost else before, clock.stages
@@ -312,7 +301,7 @@ def _join_windows(
             before = found[-1] if found else None
             done = old.get(window)
             if done is None:
-                done = work.correct(window, before, (), clock)
+                done = work.correct(window, before, clock)
             found.append(done)
 
 
@@ -328,17 +317,15 @@ def _again(
     Returns:
         Whether there were any, and the first one that does not agree whatever is done.
     """
-    again, steps = False, work.steps(found)
-    for k, window in enumerate(windows):
-        before = found[k - 1] if k else None
-        fits = work.fits(found[k], steps)
-        if fits and (before is None or work.joins(before, found[k])):
+    again = False
+    for k, window in enumerate(windows[1:], start=1):
+        if work.joins(found[k - 1], found[k]):
             continue
-        if tries[window] == AGAIN and len(windows) > 1:
-            return again, max(k, 1)
+        if tries[window] == AGAIN:
+            return again, k
         tries[window] += 1
-        found[k], again = work.correct(window, before, steps, clock), True
-        if before is not None and not work.joins(before, found[k]):
+        found[k], again = work.correct(window, found[k - 1], clock), True
+        if not work.joins(found[k - 1], found[k]):
             tries[window] = AGAIN
     return again, None
 

@@ -12,9 +12,9 @@ def searched(gain: float, middle: float, rounds: int = 8) -> tuple[float, float]
     """Search where found = middle + gain (aim - middle), clipped to the flanks."""
     search, aim = SecantSearch(), np.array([[1.0]])
     found = aim
-    for _ in range(rounds):
+    for number in range(rounds):
         found = np.clip(middle + gain * (aim - middle), -1.0, 1.0)
-        aim = search.next_aim(aim, found)
+        aim = search.next_aim(aim, found, number)
     return float(aim[0, 0]), float(np.clip(middle + gain * (aim - middle), -1, 1)[0, 0])
 
 

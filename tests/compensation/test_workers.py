@@ -28,7 +28,6 @@ class Part:
     end: int
     who: int
     begin: int
-    step: int
 
 
 @dataclass(frozen=True)
@@ -39,25 +38,18 @@ class Sum:
     off: int = 0  # what foretelling is wrong by
     breaks_at: int = -1
     apart: int = -1  # a cut at which both sides never agree
-    votes: int = -1  # a window that asks for another round
 
-    def correct(self, window, before, pace, clock) -> Part:
+    def correct(self, window, before, clock) -> Part:
         with clock("add"):
             foretold = sum(self.numbers[: window[0]])
             begin = before.end if before else foretold + (self.off if window[0] else 0)
             if self.breaks_at in window:
                 raise PostprocError(f"{self.breaks_at} from {begin}")
             end = begin + sum(self.numbers[k] for k in window)
-        return Part(window[0], end, os.getpid(), begin, max(pace, default=0))
+        return Part(window[0], end, os.getpid(), begin)
 
     def whole(self):
         return [tuple(range(len(self.numbers)))]
-
-    def fits(self, found: Part, steps) -> bool:
-        return found.step == max(steps, default=0)
-
-    def steps(self, found):
-        return [int(self.votes >= 0)]
 
     def joins(self, before: Part, after: Part) -> bool:
         return before.end == after.begin and after.number != self.apart
@@ -99,12 +91,6 @@ def test_where_two_sides_never_agree_they_become_one_window() -> None:
         found = run(Sum(NUMBERS, apart=4), processes)
         assert [part.number for part in found] == [0, 1, 2, 3, 5, 6]
         assert found[-1].end == sum(NUMBERS)
-
-
-def test_a_window_that_took_other_rounds_is_done_again() -> None:
-    found = run(Sum(NUMBERS, votes=2), 2)
-    assert {part.step for part in found} == {1}
-    assert [part.end for part in found] == np.cumsum(NUMBERS).tolist()
 
 
 @pytest.mark.parametrize("window", range(len(NUMBERS)))
