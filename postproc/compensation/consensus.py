@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -71,42 +71,46 @@ class Snapshot:
         return FlankState(self.side, PlayOperator(self.lo, self.hi))
 
 
-Look = tuple[int, bool]  # which one; whether at the numbers as they are written
-
-
 @dataclass(frozen=True)
 class Glimpses:
     """What was looked at, round by round, at some neighbouring visits.
 
     Attributes:
-        looks: By round.
+        rounds: The look of every round; none where nothing is known.
+        written: The last look at the numbers as they are written.
     """
 
-    looks: Mapping[Look, Snapshot]
+    rounds: tuple[Snapshot, ...] = ()
+    written: Snapshot | None = None
 
-    def at(self, look: Look) -> Snapshot:
-        """Return a look, or what stands for it.
+    def at(self, turn: int | None) -> Snapshot | None:
+        """Return the look of a round; None: that at written numbers.
 
         A window that has come to rest does not take the rounds of the others: what was
-        the same by then stands for them. Written numbers are looked at by all windows
-        together, so that they stand for those of another round.
+        the same by then stands for them.
         """
-        if look in self.looks:
-            return self.looks[look]
-        number, written = look
-        if written:
-            later = [k for k in self.looks if k[1] and k[0] > number]
-            if later:
-                return self.looks[min(later)]
-        for kind in (written, False):
-            before = [k for k in self.looks if k[1] == kind and k[0] <= number]
-            if before:
-                return self.looks[max(before)]
-        raise KeyError(look)
+        if turn is None or not self.rounds:
+            return self.written
+        return self.rounds[min(turn, len(self.rounds) - 1)]
+
+    def sides_at(self, turn: int | None) -> FlankState:
+        """Return the sides that were found in a look, as far as they are known."""
+        seen = self.at(turn)
+        return NO_SIDES if seen is None else seen.sides
+
+    def and_then(self, turn: int | None, seen: Snapshot) -> Glimpses:
+        """Add a look; those at written numbers take the place of each other."""
+        if turn is None:
+            return replace(self, written=seen)
+        return replace(self, rounds=(*self.rounds, seen))
 
     def __getitem__(self, rows: slice) -> Glimpses:
         """Return what was looked at at some of the visits."""
-        return Glimpses({look: seen[rows] for look, seen in self.looks.items()})
+        written = None if self.written is None else self.written[rows]
+        return Glimpses(tuple(seen[rows] for seen in self.rounds), written)
+
+
+NOT_SEEN = Glimpses()
 
 
 @dataclass
@@ -120,14 +124,13 @@ class RoundLog:
 
     left: slice = field(default_factory=lambda: slice(0, 0))
     right: slice = field(default_factory=lambda: slice(0, 0))
-    begin: dict[Look, Snapshot] = field(default_factory=dict)
-    end: dict[Look, Snapshot] = field(default_factory=dict)
+    begin: Glimpses = NOT_SEEN
+    end: Glimpses = NOT_SEEN
 
-    def see(self, look: Look, seen: Snapshot) -> None:
+    def see(self, turn: int | None, seen: Snapshot) -> None:
         """Keep what is watched of a look at all visits."""
-        for kept, rows in ((self.begin, self.left), (self.end, self.right)):
-            if rows.stop > rows.start:
-                kept[look] = seen[rows]
+        self.begin = self.begin.and_then(turn, seen[self.left])
+        self.end = self.end.and_then(turn, seen[self.right])
 
 
 # What both windows at a cut find at the visits beside it.
@@ -160,13 +163,7 @@ def _same_glimpse(a: Snapshot, b: Snapshot) -> bool:
 
 
 def same_looks(a: Glimpses, b: Glimpses) -> bool:
-    """Tell whether the same was looked at, in all rounds."""
-    return all(_same_glimpse(a.at(look), b.at(look)) for look in {*a.looks, *b.looks})
-
-
-NO_GLIMPSES = Glimpses({})
-
-
-def lead_of(seen: Glimpses, look: Look) -> FlankState:
-    """Return what is known of the sides of the first visits in a look."""
-    return seen.at(look).sides if seen.looks else NO_SIDES
+    """Tell whether the same was looked at, in all rounds and as it is written."""
+    turns = [None, *range(max(len(a.rounds), len(b.rounds)))]
+    pairs = [(a.at(turn), b.at(turn)) for turn in turns]
+    return all(x is None or y is None or _same_glimpse(x, y) for x, y in pairs)

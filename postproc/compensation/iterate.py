@@ -21,12 +21,10 @@ from postproc.arrays import (
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.arc_turns import ArcTurns
 from postproc.compensation.consensus import (
-    NO_GLIMPSES,
+    NOT_SEEN,
     Glimpses,
-    Look,
     RoundLog,
     Snapshot,
-    lead_of,
 )
 from postproc.compensation.decisions import (
     Beforehand,
@@ -376,7 +374,7 @@ class Boundary:
     """
 
     begin: StartState = NOWHERE
-    looks: Glimpses = NO_GLIMPSES
+    looks: Glimpses = NOT_SEEN
 
 
 FROM_START = Boundary()
@@ -447,12 +445,12 @@ def iterate(
     search, current, number = SecantSearch(), iteration.first_aim(), 0
     for turn in count():  # ends: from round ROUNDS on, `settled` or `held` grows
         proposal, meant = iteration.propose(current)
-        looked = course.look((turn, False), current, proposal)
+        looked = course.look(current, proposal, turn)
         most = SAME if number < ROUNDS else OTHER
         moved = current.find_flank_changes(proposal, looked.side, most)
         missed = iteration.measure_misses(proposal, looked.aside, meant, number)
         if not (moved.any() or missed.any()):
-            found, flipped = _read_back(course, current, proposal, turn)
+            found, flipped = _read_back(course, current, proposal)
             swung = iteration.find_limit_violations(proposal, found)
             if found is not None and not swung.any():
                 return found
@@ -483,14 +481,16 @@ class _Course:
     lead: Boundary
     trail: RoundLog
 
-    def look(self, look: Look, current: SolverState, proposal: Proposal) -> Replanned:
-        """Find where a proposal leads."""
+    def look(
+        self, current: SolverState, proposal: Proposal, turn: int | None = None
+    ) -> Replanned:
+        """Find where a proposal leads; without a round: as it is written."""
         values = proposal.decisions.corrected
         with self.iteration.setting.clock("plan again"):
-            near = 0.0 if look[1] else NEAR
-            found = self.replanner.after(values, lead_of(self.lead.looks, look), near)
+            near, lead = 0.0 if turn is None else NEAR, self.lead.looks.sides_at(turn)
+            found = self.replanner.after(values, lead, near)
         if self.iteration.part:
-            self.trail.see(look, _glimpse(current, proposal, found))
+            self.trail.see(turn, _glimpse(current, proposal, found))
         return found
 
 
@@ -517,7 +517,7 @@ def _glimpse(current: SolverState, proposal: Proposal, found: Replanned) -> Snap
 
 
 def _read_back(
-    course: _Course, current: SolverState, proposal: Proposal, turn: int
+    course: _Course, current: SolverState, proposal: Proposal
 ) -> tuple[Converged | None, Bools]:
     """Write the numbers, and look at them as they will be read.
 
@@ -527,7 +527,7 @@ def _read_back(
     iteration = course.iteration
     setting = iteration.setting
     edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
-    last = course.look((turn, True), current, proposal)
+    last = course.look(current, proposal)
     flipped = current.find_flank_changes(proposal, last.side, OTHER)
     if flipped.any():
         return None, flipped

@@ -22,7 +22,6 @@ from postproc.arrays import (
 from postproc.compensation import windowing as cuts
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.consensus import (
-    Glimpses,
     RoundLog,
     same_looks,
     same_rows,
@@ -446,9 +445,10 @@ class _WindowWork:
         first, end = max(cut - cuts.BAND, 0), min(cut + cuts.BAND, n)
         from_left = first - self._after(before.window)
         rows = slice(from_left, from_left + end - first)
-        looks = Glimpses(before.trail.end)[rows], Glimpses(after.trail.begin)
         ours = {name: part[rows] for name, part in before.right.items()}
-        return same_rows(ours, after.left) and same_looks(*looks)
+        return same_rows(ours, after.left) and same_looks(
+            before.trail.end[rows], after.trail.begin
+        )
 
     def merge(self, windows: Sequence[Window], cut: int) -> list[Window]:
         """Make one window of those on both sides of a cut, up to the next stops."""
@@ -467,5 +467,8 @@ def _lead(window: Window, before: Corrected | None) -> tuple[Boundary, Arrivals,
     if before is None or window.begin == 0:
         return FROM_START, UNLED, 0
     rows = slice(0, window.first - window.begin)
-    looks = Glimpses(before.trail.end)[rows]
-    return Boundary(before.exit, looks), before.arrivals, before.doubtful
+    return (
+        Boundary(before.exit, before.trail.end[rows]),
+        before.arrivals,
+        before.doubtful,
+    )
