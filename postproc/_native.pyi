@@ -154,6 +154,19 @@ def to_move(
     rounds: int,
 ) -> Floats: ...
 
+# aims.rs: which sides to correct for (`postproc.compensation.aims`)
+def next_aims(
+    core: Core,
+    solver: Solver,
+    commands: Floats,
+    tool: Floats,
+    states: _States,
+    ways: _Ways,
+    coupling: Floats,
+    free: Bools,
+    missed: Floats,
+) -> Floats: ...
+
 # commands.rs: what to command (`postproc.compensation.inverse_model`)
 def commands(
     core: Core,
@@ -225,6 +238,22 @@ def by_groups(lower: Floats, z: Floats, group: Ints, count: int) -> Floats: ...
 def of_blocks(gain: Floats, share: Floats, signals: Floats, rows: float) -> Floats: ...
 
 # names.rs: names by the million (`postproc.language.symbol_column`)
+class _Ways(Protocol):
+    @property
+    def angles(self) -> Floats: ...
+    @property
+    def first(self) -> Ints: ...
+    @property
+    def source(self) -> Ints: ...
+    @property
+    def clamps(self) -> _Clamps: ...
+    @property
+    def play(self) -> _Clamps: ...
+    @property
+    def half(self) -> Floats: ...
+    @property
+    def side(self) -> Floats: ...
+
 class _States(Protocol):
     @property
     def q(self) -> Floats: ...

@@ -179,6 +179,18 @@ pub fn states<'py>(
     Ok(ends(py, &graph.states(py)?))
 }
 
+/// Place a joint in its play, whose state lies between two ends; 0 where that tells nothing.
+pub fn place_in_play(angle: f64, lo: f64, hi: f64, half: f64) -> f64 {
+    let s = ((angle - (lo + hi) / 2.0) / half).clamp(-1.0, 1.0);
+    if s.abs() > ON_FLANK {
+        s.signum()
+    } else if hi - lo < half / 2.0 && !s.is_nan() {
+        s
+    } else {
+        0.0
+    }
+}
+
 /// Place every joint in its play, (n, 6).
 #[pyfunction]
 pub fn side<'py>(
@@ -189,18 +201,8 @@ pub fn side<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (angles, z, half) = (rows::<6>(&angles)?, z.list()?, row(&half)?);
     same_length(&[angles.len(), z.len()])?;
-    let place = |angle: f64, lo: f64, hi: f64, half: f64| {
-        let s = ((angle - (lo + hi) / 2.0) / half).clamp(-1.0, 1.0);
-        if s.abs() > ON_FLANK {
-            s.signum()
-        } else if hi - lo < half / 2.0 && !s.is_nan() {
-            s
-        } else {
-            0.0
-        }
-    };
     let sides = each(py, angles.len(), |i| -> Six {
-        std::array::from_fn(|j| place(angles[i][j], z[i].lo[j], z[i].hi[j], half[j]))
+        std::array::from_fn(|j| place_in_play(angles[i][j], z[i].lo[j], z[i].hi[j], half[j]))
     });
     Ok(array(py, sides?))
 }

@@ -5,6 +5,7 @@
 
 use pyo3::prelude::*;
 
+mod aims;
 mod aligned;
 mod chain;
 mod commands;
@@ -94,6 +95,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evidence::of_blocks, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::scaled, module)?)?;
     module.add_function(wrap_pyfunction!(heap::give_back, module)?)?;
+    module.add_function(wrap_pyfunction!(aims::next_aims, module)?)?;
     module.add_function(wrap_pyfunction!(aligned::aligned, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;
     module.add_function(wrap_pyfunction!(table::table, module)?)?;

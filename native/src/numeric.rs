@@ -209,7 +209,7 @@ fn apart(pose: &Pose, axes: &[Three; 3], origin: &Three) -> (Six, bool) {
 }
 
 /// Eliminate: the solution of sum_j columns[j] x_j = right, None where there is none.
-fn solve(columns: [Six; 6], right: Six) -> Option<Six> {
+pub fn solve(columns: [Six; 6], right: Six) -> Option<Six> {
     let mut rows: [[f64; 7]; 6] = std::array::from_fn(|i| {
         std::array::from_fn(|j| if j < 6 { columns[j][i] } else { right[i] })
     });

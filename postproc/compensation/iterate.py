@@ -18,6 +18,7 @@ from postproc.arrays import (
     spans,
     take_rows,
 )
+from postproc.compensation.aims import next_aims
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.arc_turns import ArcTurns
 from postproc.compensation.consensus import (
@@ -56,56 +57,6 @@ from postproc.robot.cell import Cell
 from postproc.robot.direction import FlankState
 from postproc.robot.pose import MM, has_unknown
 from postproc.robot.state import States
-
-# The side at which aim and arrival agree, searched joint by joint.
-
-LEAST_SHIFT = 1e-3  # change of an aim that tells how the arrival follows it
-FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
-SECANTS = 4  # rounds of secant steps, before steps of half the way
-
-
-class SecantSearch:
-    """Search, joint by joint, for the side at which aim and arrival agree.
-
-    A correction of a joint is as large as its play, so aiming where it was found last
-    may swing or creep. Secant steps settle that; where the arrival follows the aim so
-    closely that there is nothing to settle on, the joint is taken to its flank, but
-    only once. Neighbours in a fly run move each other, so that later steps go half the
-    way.
-    """
-
-    def __init__(self) -> None:
-        """Start without a history."""
-        self._aim: Floats | None = None
-        self._found: Floats | None = None
-        self._flanked: Bools = np.zeros((1, 1), dtype=bool)
-
-    def next_aim(self, aim: Floats, found: Floats, number: int) -> Floats:
-        """Give the sides to aim for next, (n, 6).
-
-        Args:
-            aim: Sides that the targets are corrected for, (n, 6).
-            found: Sides that joints then arrive at, (n, 6).
-            number: The round.
-        """
-        step = found - aim
-        if number >= SECANTS:
-            step = step / 2
-        elif self._aim is not None and self._found is not None:
-            step = self._secant(step, aim - self._aim, found - self._found)
-        self._aim, self._found = np.array(aim), np.array(found)
-        return np.clip(aim + step, -1.0, 1.0)
-
-    def _secant(self, step: Floats, shift: Floats, answer: Floats) -> Floats:
-        """Scale steps by how arrivals answered the last shift of their aims."""
-        known = np.abs(shift) > LEAST_SHIFT
-        gain = answer / np.where(known, shift, np.inf)
-        follows = gain > FOLLOWS
-        to_flank = follows & ~self._flanked
-        self._flanked = self._flanked | to_flank
-        scaled = step / np.where(follows, 2.0, 1.0 - gain)
-        return np.where(to_flank, 2.0 * np.sign(step), scaled)
-
 
 # What the targets of a window are corrected for, from round to round.
 
@@ -208,6 +159,25 @@ class Iteration:
         tool = take_rows(plan.tool, rows)[:, :3, 3]
         arm, old, new = setting.cell.arm, plan.q[rows], solved.q[rows]
         return departure(arm, old, new, tool, setting.offset)
+
+    def find_aims(
+        self,
+        current: SolverState,
+        looked: Replanned,
+        moved: Bools,
+        missed: Floats,
+        number: int,
+    ) -> Floats:
+        """Give the sides to correct some targets for next, (n, 6).
+
+        Targets of a fly run move each other, so that later steps go half of the way.
+        """
+        solved, tool = current.solved, self.planned.plan.tool[:, :3, 3]
+        if number >= IN_ORDER:
+            return (solved.direction + looked.side) / 2
+        with self.setting.clock("solve"):
+            given = self.setting.model, solved, self.states.with_(tool=tool), looked
+            return next_aims(*given, moved, missed)
 
     def next_aim(
         self, current: SolverState, moved: Bools, sides: Floats
@@ -355,7 +325,8 @@ class Replanner:
 
 # Correct and plan again, until the sides are those corrected for.
 
-ROUNDS = 8  # of correcting for changed sides, before targets are settled for
+ROUNDS = 6  # of correcting for changed sides, before targets are settled for
+IN_ORDER = 4  # rounds that settle sides in the program's order
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
 CORNERS = 3  # rounds that bend the way at all corners; later where it is far off alone
@@ -442,7 +413,7 @@ def iterate(
     trail = RoundLog() if trail is None else trail
     replanner = Replanner(reading.visits, planned.targets, setting.cell, lead.begin)
     course = _Course(iteration, replanner, lead, trail)
-    search, current, number = SecantSearch(), iteration.first_aim(), 0
+    current, number = iteration.first_aim(), 0
     for turn in count():  # ends: from round ROUNDS on, `settled` or `held` grows
         proposal, meant = iteration.propose(current)
         looked = course.look(current, proposal, turn)
@@ -455,12 +426,11 @@ def iterate(
             if found is not None and not swung.any():
                 return found
             held, swung = current.held | flipped, current.swung | swung
-            current = replace(current, held=held, swung=swung)
-            search, number = SecantSearch(), CORNERS
+            current, number = replace(current, held=held, swung=swung), CORNERS
             continue
         settled = current.settled | moved if number >= ROUNDS else current.settled
         current = replace(current, bent=current.bent + missed, settled=settled)
-        sides = search.next_aim(current.solved.direction, looked.side, number)
+        sides = iteration.find_aims(current, looked, moved, missed, number)
         current, number = iteration.next_aim(current, moved, sides), number + 1
     raise AssertionError("unreachable")
 

