@@ -164,6 +164,7 @@ def next_aims(
     ways: _Ways,
     coupling: Floats,
     free: Bools,
+    passes: Bools,
     missed: Floats,
 ) -> Floats: ...
 

@@ -21,8 +21,9 @@ use crate::terms::State;
 const STEP: f64 = 0.5; // of a side, by which the answer of a command is found
 const SETTLED: f64 = 1e-6; // sides that differ by less are the same
 const AGREES: f64 = 1e-3; // .. and need no other correction
-const GOES_ON: usize = 8; // looks along the answers, which lead to a flank if any does
-const NEWTON: usize = 12; // looks along their derivatives
+const GOES_ON: usize = 8; // looks along the answers, and as many from flanks
+const NEWTON: usize = 6; // looks along their derivatives
+const NEAR: f64 = 4.0; // halves of a play's width: a joint that moves farther may well leap
 const LEAP: f64 = 0.5; // of a side, from visit to visit
 const LEAPT: f64 = 0.1; // what a leap counts against what is off, both of a side
 const TINY: f64 = 1e-7; // of a side, for derivatives
@@ -55,6 +56,7 @@ struct Settling<'a> {
     half: Six,
     found: &'a [Six],
     free: &'a [bool],
+    passes: &'a [bool],
     /// By what the path misses places, and is to be bent.
     missed: &'a [Three],
     /// What is known of the play at visits, as it becomes.
@@ -73,7 +75,7 @@ impl Settling<'_> {
     fn is_sound(&self) -> bool {
         let (n, e) = (self.aims.len(), self.clamps.len());
         let columns = [self.commands.len(), self.angles.len(), self.found.len()];
-        let others = [self.free.len(), self.missed.len(), self.play.len()];
+        let others = [self.free.len(), self.passes.len(), self.missed.len(), self.play.len()];
         columns.iter().chain(&others).all(|length| *length == n)
             && (self.tools.len() == 1 || self.tools.len() == n)
             && self.first.len() == n + 1
@@ -85,8 +87,9 @@ impl Settling<'_> {
 
     /// Settle a visit; return the sides to correct it for.
     ///
-    /// Looked for is what agrees next to the sides of the visit before: there may be more
-    /// of them, and a path should not leap to and fro.
+    /// Looked for is what agrees next to its sides; of joints that hardly move on a way
+    /// without a stop, next to those of the visit before: there may be several that agree,
+    /// and a path should not leap to and fro.
     fn settle(&mut self, i: usize) -> Six {
         let aim = self.states.side[i];
         let (rests, bent) = ([0.0; 6], self.bent(i));
@@ -107,19 +110,29 @@ impl Settling<'_> {
             let sides = self.sides(i, &by, &self.arrived(i, &by));
             std::array::from_fn(|j| if told[j] { sides[j] } else { self.found[i][j] })
         };
-        let begin = self.before(i).map_or(aim, |source| self.aims[source]);
-        let next = agreed(answer, &begin);
+        let near = self.near(i);
+        let begin = std::array::from_fn(|j| near[j].unwrap_or(aim[j]));
+        let weight = near.map(|side| if side.is_some() { LEAPT } else { 0.0 });
+        let next = agreed(answer, &begin, &weight);
         let by = sum(&bent, &moved(&gain, &next, &aim));
         self.play[i] = self.arrived(i, &by);
         self.shift[i] = by;
         next
     }
 
-    /// The visit that alone leads to one.
-    fn before(&self, i: usize) -> Option<usize> {
+    /// The sides of the visit that alone leads to one, of joints that hardly move on a way
+    /// without a stop.
+    fn near(&self, i: usize) -> [Option<f64>; 6] {
         let edge = self.first[i] as usize;
         let alone = self.first[i + 1] as usize == edge + 1;
-        alone.then(|| usize::try_from(self.source[edge]).ok().filter(|s| *s < i)).flatten()
+        let Some(source) = alone.then(|| usize::try_from(self.source[edge]).ok()).flatten() else {
+            return [None; 6];
+        };
+        let goes_on = source < i && (self.passes[source] || self.passes[i]);
+        std::array::from_fn(|j| {
+            let way = (self.angles[i][j] - self.angles[source][j]).abs();
+            (goes_on && way < NEAR * self.half[j]).then(|| self.aims[source][j])
+        })
     }
 
     fn sides(&self, i: usize, by: &Six, play: &Clamp) -> Six {
@@ -241,31 +254,57 @@ fn largest(values: &Six) -> f64 {
 
 /// Find sides that are their own answer, or nearly so.
 ///
-/// First they follow their answers: where these run away, to a flank; where they creep or
-/// swing, Newton's method goes on. A leap is taken where it brings much.
-fn agreed(answer: impl Fn(&Six) -> Six, begin: &Six) -> Six {
+/// First they follow their answers, then from the flanks that lie ahead; where they creep
+/// or swing, Newton's method goes on from the best ones. A leap is taken where it
+/// brings more than its weight.
+fn agreed(answer: impl Fn(&Six) -> Six, begin: &Six, weight: &Six) -> Six {
     let off = |next: &Six| -> Six {
         let found = answer(next);
         std::array::from_fn(|j| found[j] - next[j])
     };
-    let mut next = *begin;
-    let (mut best, mut least) = (next, f64::INFINITY);
-    for look in 0..GOES_ON + NEWTON {
+    let (mut next, mut best, mut least) = (*begin, *begin, f64::INFINITY);
+    let mut look = 0;
+    while look < 2 * GOES_ON + NEWTON && least > SETTLED {
         let step = off(&next);
-        let size = largest(&step);
-        let leap: Six = std::array::from_fn(|j| next[j] - begin[j]);
-        let leap = largest(&leap);
-        let cost = if leap > LEAP { size + LEAPT * leap } else { size };
+        let leap = |j: usize| (next[j] - begin[j]).abs();
+        let leaps = (0..6).filter(|j| leap(*j) > LEAP).map(|j| weight[j] * leap(j));
+        let cost = largest(&step) + leaps.fold(0.0, f64::max);
         if cost < least {
             (best, least) = (next, cost);
         }
-        if size <= SETTLED {
-            break;
-        }
-        let step = if look < GOES_ON { step } else { newton(&off, &next, &step) };
+        look += 1;
+        let step = match look {
+            GOES_ON => to_flanks(&step, weight),
+            look if look < 2 * GOES_ON => step,
+            _ => newton(&off, &next, &step),
+        };
+        let last = next;
         next = std::array::from_fn(|j| (next[j] + step[j]).clamp(-1.0, 1.0));
+        if (0..6).all(|j| (next[j] - last[j]).abs() <= SETTLED) {
+            // It stays: go on with what comes behind.
+            look = match look {
+                look if look < GOES_ON => GOES_ON - 1,
+                look if look < 2 * GOES_ON => 2 * GOES_ON,
+                _ => break,
+            };
+        }
+        if look == 2 * GOES_ON {
+            next = best;
+        }
     }
     best
+}
+
+/// Steps that lead to the flanks that lie ahead, where leaps have no weight.
+fn to_flanks(step: &Six, weight: &Six) -> Six {
+    std::array::from_fn(|j| {
+        let far = step[j].abs() > AGREES && weight[j] == 0.0;
+        if far {
+            2.0 * step[j].signum()
+        } else {
+            step[j]
+        }
+    })
 }
 
 /// The step of Newton's method; where there is none, half of the way.
@@ -285,7 +324,7 @@ fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
 /// Args: the model and the inverse kinematics; commands (n, 4, 4) [m] and tools, likewise
 /// or (1, 4, 4); their states: joint angles of the commands, and the sides that they were
 /// made for; the ways that led to the visits; (6, 6), from joints to drives; which may be
-/// corrected for other sides, (n,); by what the path misses places and is to be bent,
+/// corrected for other sides, and which the arm passes, (n,); by what the path misses places and is to be bent,
 /// (n, 3) [m].
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what a look has found
@@ -299,6 +338,7 @@ pub fn next_aims<'py>(
     ways: Ways<'py>,
     coupling: PyReadonlyArray2<'py, f64>,
     free: PyReadonlyArray1<'py, bool>,
+    passes: PyReadonlyArray1<'py, bool>,
     missed: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let odd = |_| PyIndexError::new_err("six rows of six");
@@ -319,6 +359,7 @@ pub fn next_aims<'py>(
         half: row(&ways.half)?,
         found: rows::<6>(&ways.side)?,
         free: flat(&free)?,
+        passes: flat(&passes)?,
         missed: rows::<3>(&missed)?,
         play,
         shift: vec![[0.0; 6]; n],

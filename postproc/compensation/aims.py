@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, few_rows, floats
 from postproc.compensation.inverse_model import Commands
@@ -57,10 +59,11 @@ def next_aims(
 
     A correction moves its target, and so the place of every joint in its play there and
     behind: by as much as the play is wide. A target is settled with what the ones
-    before it have become, next to the sides that the last of them is corrected for:
-    where the arrival answers the aim by more than the aim changes, there are several
-    such sides. Where none is near, the nearest miss is taken, not a leap that the next
-    target would have to take back.
+    before it have become. Where the arrival answers the aim by more than the aim
+    changes, several sides agree: taken are those next to its own, and of joints that
+    hardly move on a way without a stop next to those of the target before. If none is
+    near there, the nearest miss is taken, not a leap that the next target would have to
+    take back.
 
     How far the ways between have moved is taken from both of their ends: what that
     misses, a further look at the program finds.
@@ -75,8 +78,9 @@ def next_aims(
     """
     arm, evaluator = looked.arm, model.evaluator(looked.arm)
     here = states.with_(q=solved.q, direction=solved.direction)
+    fly = np.ascontiguousarray(looked.targets.fly)
     poses = floats(solved.command), floats(few_rows(looked.targets.tool))
     return _native.next_aims(
         evaluator.core, arm.solver, *poses, evaluator.states(here), Ways.of(looked),
-        floats(arm.coupling), free, floats(missed),
+        floats(arm.coupling), free, fly, floats(missed),
     )  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.aims import next_aims
+from postproc.compensation.compensate import compensate
 from postproc.compensation.iterate import SAME, Iteration, Replanner, SolverState
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
 from postproc.compensation.program import (
@@ -20,6 +21,7 @@ from postproc.motion.joint_path import NOWHERE
 from postproc.motion.replan import Replanned
 from postproc.robot.direction import NO_SIDES
 from tests.compensation.test_micro_batch import crowded
+from tests.conftest import ROOT
 
 
 @dataclass
@@ -109,3 +111,11 @@ def test_columns_of_other_lengths_are_refused(job_cell, job_model) -> None:
     looked = job.look(current)
     with pytest.raises(IndexError, match="not there"):
         job.aims(current, looked, np.zeros(3, dtype=bool))
+
+
+def test_targets_at_stops_are_settled_on_the_flank_that_agrees(
+    bench_cell, bench_model
+) -> None:
+    """Joint 1 rests there, and the arrival answers by more than the aim changes."""
+    done = compensate(ROOT / "programs" / "handling.pdl", bench_cell, bench_model)
+    assert done.before.n > 80 and done.after.max_mm < 0.001
