@@ -118,4 +118,4 @@ def test_targets_at_stops_are_settled_on_the_flank_that_agrees(
 ) -> None:
     """Joint 1 rests there, and the arrival answers by more than the aim changes."""
     done = compensate(ROOT / "programs" / "handling.pdl", bench_cell, bench_model)
-    assert done.before.n > 80 and done.after.max_mm < 0.001
+    assert done.before.n > 40 and done.after.max_mm < 0.001
