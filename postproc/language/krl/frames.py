@@ -75,13 +75,12 @@ class FrameReader:
 
     Attributes:
         task: The files of the job.
-        row, here: The statement.
+        here: The statement.
         tool, base: What ``$TOOL`` and ``$BASE`` are there.
         store: What the program has set before.
     """
 
     task: KrlTask
-    row: int
     here: Scope
     tool: KrlFrame
     base: KrlFrame
@@ -100,7 +99,7 @@ class FrameReader:
                 name="tool_data" | "base_data" as table,
                 steps=(ir.ElementStep() as step,),
             ):
-                number = self.task.index(step, self.row, self.here)
+                number = self.task.index(step, self.here)
                 if number is None or len(number) != 1:
                     return no_frame(_WHICH.format(table.upper()))
                 return self.entry(table, number[0])
@@ -114,20 +113,16 @@ class FrameReader:
     def _call(self, name: str, arguments: Sequence[ir.Operand | None]) -> KrlFrame:
         """Read a frame that one of the functions of modern inline forms gives."""
         first = arguments[0] if arguments else None
-        value = self.task.value(first, self.row, self.here)
+        value = self.task.value(first, self.here)
         match name:
             case "stool2" if isinstance(value, KnownRecord):
                 found = self.read_numbered("$tool", value.number("tool_no"))
                 still = value.get("ipo_frame") != "#base"
                 return replace(found, remote=still) if still else found
             case "stool":
-                return self.read_numbered(
-                    "$tool", self.task.number(first, self.row, self.here)
-                )
+                return self.read_numbered("$tool", self.task.number(first, self.here))
             case "sbase":
-                return self.read_numbered(
-                    "$base", self.task.number(first, self.row, self.here)
-                )
+                return self.read_numbered("$base", self.task.number(first, self.here))
             case "ek" | "lk" | "ey" | "eb" | "eb_abs":
                 return no_frame(_CHAINED.format(name.upper()), Code.EXTERNAL_AXES)
         return no_frame(f"what {name.upper()} gives is not known")
@@ -180,8 +175,8 @@ class FrameReader:
         if found is None or found[1].value is None:
             return None
         file, datum = found
-        there = Scope(file, self.task.files[file].name, "")
-        pose = pose_of(self.task.value(datum.value, datum.row, there))
+        there = Scope(file, self.task.files[file].name, "", row=datum.row)
+        pose = pose_of(self.task.value(datum.value, there))
         taught = self.task.is_taught(table, file, datum.row)
         return KrlFrame(pose, taught=taught) if pose else None
 
@@ -197,8 +192,8 @@ class FrameReader:
         if found is None:
             return False
         file, datum = found
-        there = Scope(file, self.task.files[file].name, "")
-        value = self.task.value(datum.value, datum.row, there)
+        there = Scope(file, self.task.files[file].name, "", row=datum.row)
+        value = self.task.value(datum.value, there)
         known = (
             value.number("mach_def_index") if isinstance(value, KnownRecord) else 1.0
         )
@@ -211,7 +206,7 @@ class FrameReader:
 
     def _record(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame that is written or named."""
-        value = self.task.value(operand, self.row, self.here)
+        value = self.task.value(operand, self.here)
         pose = pose_of(value)
         if pose and isinstance(operand, ir.DataObject):
             taught, found = False, self.task.datum(operand.name, self.here)
@@ -219,7 +214,7 @@ class FrameReader:
                 taught = self.task.is_taught(operand.name, found[0], found[1].row)
             return KrlFrame(pose, taught=taught)
         if pose:
-            taught = self.task.is_taught("", self.here.file, self.row)
+            taught = self.task.is_taught("", self.here.file, self.here.row)
             return KrlFrame(pose, taught=taught)
         if isinstance(operand, ir.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))

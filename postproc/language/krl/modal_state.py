@@ -240,11 +240,10 @@ class ModeReader:
 
     Attributes:
         task: The files of the job.
-        row, here: Where the statement stands.
+        here: Where the statement stands.
     """
 
     task: KrlTask
-    row: int
     here: Scope
 
     def assign(self, modes: KrlModes, one: ir.Assignment) -> KrlModes | None:
@@ -314,16 +313,14 @@ class ModeReader:
 
     def frames(self, modes: KrlModes) -> FrameReader:
         """Return what reads frames here."""
-        return FrameReader(
-            self.task, self.row, self.here, modes.tool, modes.base, modes.store
-        )
+        return FrameReader(self.task, self.here, modes.tool, modes.base, modes.store)
 
     def _entry(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
         """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
         table, store = one.target.name, modes.store
         index = None
         if one.target.steps:
-            index = self.task.index(one.target.steps[0], self.row, self.here)
+            index = self.task.index(one.target.steps[0], self.here)
         if index is None or len(index) != 1:
             return store.without(table)
         key, parts = entry_name(table, index[0]), one.target.steps[1:]
@@ -371,11 +368,11 @@ class ModeReader:
         own = not self.task.is_global(one.target.name, self.here)
         if one.target.steps or own or one.target.name in self.task.beside:
             return modes.with_(**{name: None})
-        found = self.task.value(one.value, self.row, self.here)
+        found = self.task.value(one.value, self.here)
         return modes.with_(**{name: found})
 
     def _number(self, operand: ir.Operand | None) -> float:
-        return self.task.number(operand, self.row, self.here)
+        return self.task.number(operand, self.here)
 
     def _argument(self, operand: ir.Operand, at: int = 0) -> ir.Operand | None:
         """Return an argument of a function, None where it is not there."""
@@ -385,15 +382,15 @@ class ModeReader:
         return given[at].value if at < len(given) else None
 
     def _record(self, operand: ir.Operand | None) -> KnownRecord:
-        found = self.task.value(operand, self.row, self.here)
+        found = self.task.value(operand, self.here)
         return found if isinstance(found, KnownRecord) else KnownRecord((), whole=False)
 
     def _word(self, operand: ir.Operand, field: str) -> str:
         """Read ``#BASE``, or what ``SIPO_MODE(FP1.IPO_FRAME)`` gives, "" if unknown."""
-        found = self.task.value(operand, self.row, self.here)
+        found = self.task.value(operand, self.here)
         if isinstance(operand, ir.FunctionCall):
             inside = self._argument(operand)
-            found = self.task.value(inside, self.row, self.here)
+            found = self.task.value(inside, self.here)
             if isinstance(found, KnownRecord):
                 found = found.get(field)
         return found.lower() if isinstance(found, str) else ""
@@ -466,7 +463,7 @@ class ModeReader:
             case (), ir.FunctionCall(name="sload"):
                 return self.take_load(modes, self._number(self._argument(operand)))
             case (), ir.DataObject(name="load_data", steps=(ir.ElementStep() as step,)):
-                index = self.task.index(step, self.row, self.here) or (math.nan,)
+                index = self.task.index(step, self.here) or (math.nan,)
                 return self.take_load(modes, index[0])
             case (), _:
                 return replace(modes, load=load_of(self._record(operand)))
@@ -486,8 +483,8 @@ class ModeReader:
         if entry <= 0 or found is None:
             return replace(modes, load=CELL_LOAD)
         file, datum = found
-        there = Scope(file, self.task.files[file].name, "")
-        value = self.task.value(datum.value, datum.row, there)
+        there = Scope(file, self.task.files[file].name, "", row=datum.row)
+        value = self.task.value(datum.value, there)
         load = load_of(value) if isinstance(value, KnownRecord) else LOST_LOAD
         return replace(modes, load=load)
 

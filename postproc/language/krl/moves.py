@@ -136,63 +136,60 @@ class KrlGoals:
     def visits(
         self,
         move: said.KrlMove,
-        row: int,
         here: Scope,
         modes: object,
         points: Points,
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
-        block, given = self.block(row, here), dict[str, Any]()
+        block, given = self.block(here), dict[str, Any]()
         in_joints = False
         if block is not None:
-            move, given = self._in_block(move, row, here, block)
+            move, given = self._in_block(move, here, block)
             begin = self.task.files[here.file].text.statement(block.start)
             in_joints = (
                 isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
             )
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._reader(move, row, here).end(move.to), SPLINE)
-            yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
+            goal = not_reached(self._reader(move, here).end(move.to), SPLINE)
+            yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
             return
-        reader = self._reader(move, row, replace(here, points=points))
-        angle = math.radians(self.task.number(move.angle, row, here))
+        reader = self._reader(move, replace(here, points=points))
+        angle = math.radians(self.task.number(move.angle, here))
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
             goal = reader.end(move.via)
-            yield KrlVisit(
-                here, row, motion, True, goal, modes, why=why, **given, move=move
-            )
+            yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
         goal = reader.end(move.to)
         if why:
             goal = not_reached(goal, ANGLE)
         yield KrlVisit(
-            here, row, motion, False, goal, modes,
+            here, motion, False, goal, modes,
             why=SPLINE if in_joints else NO_REASON,
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
-    def _reader(self, move: said.KrlMove, row: int, here: Scope) -> KrlGoal:
-        within = self.block(row, here) is not None
-        return KrlGoal(self.task, row, here, move, within, self.aux)
+    def _reader(self, move: said.KrlMove, here: Scope) -> KrlGoal:
+        within = self.block(here) is not None
+        return KrlGoal(self.task, here, move, within, self.aux)
 
-    def block(self, row: int, here: Scope) -> range | None:
+    def block(self, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
-        at = bisect_right(blocks, row, key=lambda rows: rows.start) - 1
-        return blocks[at] if at >= 0 and row in blocks[at] else None
+        at = bisect_right(blocks, here.row, key=lambda rows: rows.start) - 1
+        return blocks[at] if at >= 0 and here.row in blocks[at] else None
 
     def _in_block(
-        self, move: said.KrlMove, row: int, here: Scope, rows: range
+        self, move: said.KrlMove, here: Scope, rows: range
     ) -> tuple[said.KrlMove, dict[str, Any]]:
         """Blend the last move of a block as its end says; say what visits share."""
         file = self.task.files[here.file]
-        inner = row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
+        inner = here.row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
         end = file.text.statement(rows.stop)
         if isinstance(end, said.SplineBlock) and not inner:
             move = replace(move, words=(*move.words, *end.words))
-        shared = {"block": (here, rows.start), "begin": rows.start, "inner": inner}
+        shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
         return move, shared
 
 
@@ -412,7 +409,7 @@ class KrlGoal(GoalReader):
             return self.unknown(AT_RUN_TIME)
         base = self.plain_goal(point)
         own, shifts = self._find_own_shift(other), f"{base.name} is shifted by what"
-        shift = FrameReader(self.task, self.row, self.here, _NO, _NO).frame(other)
+        shift = FrameReader(self.task, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not shift.pose:
             return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
         if behind and self._by_joints:
@@ -432,7 +429,7 @@ class KrlGoal(GoalReader):
 
     def _find_own_shift(self, other: ir.Operand) -> frozenset[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
-        value = self.task.value(other, self.row, self.here)
+        value = self.task.value(other, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
         file, slots = locate_numbers(numbers or (), WIDTH)
         return frozenset([(file, slots[0])] if file == self.here.file else [])
@@ -443,7 +440,7 @@ class KrlGoal(GoalReader):
         A frame says nothing of them: they stay where they are, wherever the point has
         them at 0. Where the point has them elsewhere it is left like the point itself.
         """
-        value = self.task.value(other, self.row, self.here)
+        value = self.task.value(other, self.here)
         own = self._outside(
             value if isinstance(value, KnownRecord) else KnownRecord(())
         )
@@ -457,7 +454,7 @@ class KrlGoal(GoalReader):
 
         Those of data may serve other moves and sums too: they stay.
         """
-        value = self.task.value(other, self.row, self.here)
+        value = self.task.value(other, self.here)
         record = value if isinstance(value, KnownRecord) else KnownRecord(())
         numbers = _numbers(record, PLACE)
         told = [n.value for n in numbers] if numbers else six_numbers(frame)
@@ -472,7 +469,7 @@ class KrlGoal(GoalReader):
 
     def _step(self, operand: ir.Operand | None) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
-        found = self.task.value(operand, self.row, self.here)
+        found = self.task.value(operand, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
             found, KnownRecord
         ):

@@ -214,17 +214,17 @@ class KrlTask(TaskSymbols[KrlFile]):
         for table in self.odd_words.intersection(TABLES):
             found[table].add(ANY)
         for number, file in enumerate(self.files):
-            here = Scope(number, file.name, "")
+            there = Scope(number, file.name, "")
             for row in file.text.where(lambda one: bool(self.list_changes(one))):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in found and not given:
-                        found[target.name].add(self._entry(target, row, here))
+                        found[target.name].add(self._entry(target, there.at(row)))
         return {table: frozenset(numbers) for table, numbers in found.items()}
 
-    def _entry(self, target: ir.DataObject, row: int, here: Scope) -> int:
+    def _entry(self, target: ir.DataObject, here: Scope) -> int:
         """Return the number of an entry, ANY where it is not known."""
-        index = self.index(target.steps[0], row, here) if target.steps else None
+        index = self.index(target.steps[0], here) if target.steps else None
         return index[0] if index is not None and len(index) == 1 else ANY
 
     def initial_switch(self, name: str) -> bool | None:
@@ -324,9 +324,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     # Values.
 
-    def build(
-        self, operand: ir.Operand, row: int, here: Scope, depth: int
-    ) -> Value | None:
+    def build(self, operand: ir.Operand, here: Scope, depth: int) -> Value | None:
         """Evaluate words and aggregates.
 
         What a component is that is written twice is not known.
@@ -337,7 +335,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             case said.KrlAggregate(fields=fields):
                 times = Counter(f.name for f in fields)
                 once = [f for f in fields if times[f.name] == 1]
-                pairs = [(f.name, self.value(f.value, row, here, depth)) for f in once]
+                pairs = [(f.name, self.value(f.value, here, depth)) for f in once]
                 known = tuple((name, one) for name, one in pairs if one is not None)
                 return KnownRecord(known, len(known) == len(fields))
         return None

@@ -82,14 +82,13 @@ def visits_of(machine: KrlMachine) -> Visits:
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
     """Add what a move sets for itself; say where that is not known."""
     modes: KrlModes = v.modes
-    given = [(v.row, one) for one in v.move.settings]
+    given = [(v.scope, one) for one in v.move.settings]
     if v.begin >= 0:
         block = machine.texts[v.scope.file].statement(v.begin)
         assert isinstance(block, SplineBlock)
-        given = [(v.begin, one) for one in block.settings] + given
-    for row, setting in given:
-        reader = ModeReader(machine.task, row, v.scope)
-        after = reader.assign(modes, setting)
+        given = [(v.scope.at(v.begin), one) for one in block.settings] + given
+    for here, setting in given:
+        after = ModeReader(machine.task, here).assign(modes, setting)
         if after is None:
             text = f"{_NOT_SET}: {setting.target.name.upper()}"
             return modes, Reason(Code.SETTING_UNTRACKED, text)

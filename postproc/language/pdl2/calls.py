@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.call_context import At
 from postproc.language.language import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
@@ -142,7 +143,7 @@ def call_statement(machine: Machine, here: Execution, call: ir.Instruction) -> b
         here.store.lose_place()
         return False
     _bind(here, inside, call.values)
-    machine.call(here.context, here.row, inside, here.store)
+    machine.call(At(here.context, here.row), inside, here.store)
     return True
 
 

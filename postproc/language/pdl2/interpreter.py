@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.call_context import CALLED, HANDLED, Context
+from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
@@ -92,38 +92,32 @@ class Pdl2Machine(Machine):
         """Find blocks with what is known of the job."""
         self.blocks = MoveBlocks(self)
 
-    def at(self, context: Context, row: int, store: Store) -> Execution:
+    def point(self, at: At, store: Store) -> Execution:
         """Return the point of the execution at a row."""
-        return Execution(self.world, context.place, row, store, self.volatile, context)
+        return Execution(self.world, at.place, at.row, store, self.volatile, at.context)
 
-    def run_block(
-        self, context: Context, row: int, state: Store
-    ) -> tuple[int, Store] | None:
+    def run_block(self, at: At, state: Store) -> tuple[int, Store] | None:
         """Run a block of moves, or all moves of a body whose blocks do not close."""
-        here = self.at(context, row, state)
+        here = self.point(at, state)
         if here.place.body.broken:
             run_broken(self, here)
             return here.place.body.last, state
         return (here.row, state) if self.blocks.run(here) else None
 
-    def act(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Store
-    ) -> Store | None:
+    def act(self, at: At, one: ir.SourceStatement, state: Store) -> Store | None:
         """Run one statement that leads to the next row, or into a routine."""
         if isinstance(one, ast.When):
             then = one.then
-            return state if then is None else self.run_one(context, row, then, state)
-        here = self.at(context, row, state)
+            return state if then is None else self.run_one(at, then, state)
+        here = self.point(at, state)
         text = one.text if isinstance(one, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         return state if step(self, here, one) else None
 
-    def before(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Store
-    ) -> Store:
+    def before(self, at: At, one: ir.SourceStatement, state: Store) -> Store:
         """Allow for what a line does besides leading elsewhere."""
-        here = self.at(context, row, state)
-        written = here.place.program.lines.statement(row)
+        here = self.point(at, state)
+        written = here.place.program.lines.statement(at.row)
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if text:
@@ -133,46 +127,46 @@ class Pdl2Machine(Machine):
         return state
 
     def evaluate(
-        self, context: Context, row: int, operand: ir.Operand | None, state: Store
+        self, at: At, operand: ir.Operand | None, state: Store
     ) -> float | str | None:
         """Return a number, a text or a truth, None where only the run tells."""
-        found = self.at(context, row, state).value(operand)
+        found = self.point(at, state).value(operand)
         return found if isinstance(found, float | bool | str) else None
 
     def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
         """Return what SELECT names."""
         return super().selector(ast.action(head) or head)
 
-    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+    def counts_alone(self, at: At, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
-        place, key = context.place, self.world.root(context.place, loop.name)
-        inside = list_live(self.world, place, row + 1, place.flow.end[row])
+        place, key = at.place, self.world.root(at.place, loop.name)
+        inside = list_live(self.world, place, at.row + 1, place.flow.end[at.row])
         return loop.name not in self.volatile and not any(
             loop.name in part.effects.assigned
             and self.world.root(part.place, loop.name) == key
             for part in inside
         )
 
-    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+    def say_not_unrolled(self, at: At, rounds: int) -> None:
         """Say that a loop runs too often to be followed round by round."""
         text = NOT_UNROLLED.format(rounds)
-        program = context.place.program
-        self.world.report_once(program, row, Code.LOOP_NOT_UNROLLED, str(row), text)
+        code, program = Code.LOOP_NOT_UNROLLED, at.place.program
+        self.world.report_once(program, at.row, code, str(at.row), text)
 
     def begin_round(
-        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Store
+        self, at: At, loop: ir.ForLoop, value: float, state: Store
     ) -> tuple[Place, Store]:
         """Give the variable of a loop its value."""
-        key = self.at(outer, row, state).locate(ir.DataObject(loop.name)).key
+        key = self.point(at, state).locate(ir.DataObject(loop.name)).key
         state.write(key, value)
-        return outer.place, state
+        return at.place, state
 
     def forget_counter(
-        self, context: Context, row: int, loop: ir.ForLoop, ended: bool, state: Store
+        self, at: At, loop: ir.ForLoop, ended: bool, state: Store
     ) -> Store:
         """Forget the variable of a loop."""
         why = "it counted a loop that has ended" if ended else "it counts a loop"
-        invalidate(self.at(context, row, state), ir.DataObject(loop.name), why)
+        invalidate(self.point(at, state), ir.DataObject(loop.name), why)
         return state
 
     def leave(self, context: Context, state: Store, by_return: bool = False) -> None:
@@ -180,18 +174,16 @@ class Pdl2Machine(Machine):
         call = context.call
         body = call.place.body
         if not by_return and body.flow.cycle >= 0 and not body.name:
-            self.enter(call, body.flow.cycle, state)
+            self.enter(At(call, body.flow.cycle), state)
         elif call.kind == CALLED:
             for name in body.own_names:
                 state.drop(self.world.root(call.place, name))
             self.return_to_caller(call, state)
 
-    def leave_otherwise(
-        self, context: Context, row: int, one: ir.Leave, state: Store
-    ) -> Store | None:
+    def leave_otherwise(self, at: At, one: ir.Leave, state: Store) -> Store | None:
         """Begin the next cycle (EXIT CYCLE); without one the program goes on."""
-        _cancel(self.at(context, row, state))
-        return None if self.begin_cycle(context, state) else state
+        _cancel(self.point(at, state))
+        return None if self.begin_cycle(at.context, state) else state
 
 
 # What each statement does to the store.
@@ -589,7 +581,7 @@ def _start(machine: Machine) -> None:
     _handlers(machine, store)
     if program.main is not None:
         machine.root.place = world.place(program, program.main)
-        machine.enter(machine.root, program.main.first + 1, store)
+        machine.enter(At(machine.root, program.main.first + 1), store)
 
 
 def _handlers(machine: Machine, store: Store) -> None:
@@ -656,4 +648,4 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
     text = f"this condition handler {moves}: the start of every move is uncertain"
     machine.world.report_once(place.program, row, code, str(row), text)
     context = machine.root.within(place.offset + row, HANDLED, place)
-    machine.enter(context, row + 1, store)
+    machine.enter(At(context, row + 1), store)

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.interpreter import Interpreter, calls_around
 from postproc.language.pdl2.abstract_state import (
     MANY,
@@ -233,7 +233,7 @@ class Machine(Interpreter[Store]):
         """Go on with the next cycle of the program that runs; False without one."""
         for one in context.around():
             if one.place is not None and one.place.flow.cycle >= 0:
-                self.enter(one, one.place.flow.cycle, store)
+                self.enter(At(one, one.place.flow.cycle), store)
                 return True
         return False
 
