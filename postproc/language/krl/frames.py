@@ -24,11 +24,10 @@ from postproc.language.krl.abstract_state import (
 from postproc.language.krl.pose_encoding import (
     COMPONENTS,
     KRL_DIALECT,
-    abc_from_rotation,
+    numbers_of,
 )
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
-from postproc.robot.pose import MM
 
 
 @dataclass(frozen=True)
@@ -245,9 +244,7 @@ def pose_of(value: object) -> Pose:
 
 def six_numbers(frame: KrlFrame) -> list[float]:
     """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
-    pose = np.array(frame.pose).reshape(4, 4)
-    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
-    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
+    return numbers_of(np.array(frame.pose).reshape(4, 4))
 
 
 UPRIGHT = 1e-6  # cosine of B up to which A and C are not told apart

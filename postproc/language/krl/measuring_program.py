@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from postproc.language.krl.pose_encoding import abc_from_rotation
+from postproc.language.krl.pose_encoding import numbers_of
 from postproc.language.krl.symbols import AXES
 from postproc.language.measuring_program import (
     CORNER_MM,
@@ -18,7 +16,6 @@ from postproc.language.measuring_program import (
     MeasuringStep,
     MountedProbe,
 )
-from postproc.robot.pose import MM
 
 # What the inline form INI of every program says, then speed and acceleration.
 _INI = (
@@ -85,7 +82,5 @@ def _write_step(step: MeasuringStep, program: MeasuringProgram) -> Iterator[str]
 
 def _write_pose(line: MeasuringLine) -> str:
     """Write the end of a line as a frame, which keeps the configuration."""
-    angles = abc_from_rotation(line.pose[None, :3, :3], np.zeros((1, 3)))[0]
-    numbers = (*(line.pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist())
-    named = zip("XYZABC", numbers, strict=True)
+    named = zip("XYZABC", numbers_of(line.pose), strict=True)
     return f"{{{','.join(f'{name} {v:.5f}' for name, v in named)}}}"
