@@ -20,6 +20,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Indices, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import visits
 from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.conditions import Conditions, Zone
 from postproc.language.analysis.found_visits import (
@@ -41,15 +42,6 @@ from postproc.language.analysis.visit_columns import (
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.statement_table import StatementText
-from postproc.language.visits import (
-    Blend,
-    Graph,
-    Literals,
-    Meaning,
-    Visits,
-    ZoneRule,
-    texts_of,
-)
 
 ONLY_SHIFTED = Reason(
     Code.NUMBERS_NOT_OWN,
@@ -89,20 +81,22 @@ def zone_at(
         unsized: It may be a stop, or be passed in a zone of any size.
     """
     if overlap >= 0.0:
-        return Zone(size_mm if size_mm >= 0.0 else math.nan, overlap, Blend.OVERLAP)
+        return Zone(
+            size_mm if size_mm >= 0.0 else math.nan, overlap, visits.Blend.OVERLAP
+        )
     if not (via or exact or unsized or size_mm >= 0.0):
         return Zone(overlap_percent=100.0)
-    rule = ZoneRule.PASS if exact else ZoneRule.FROM
-    rule = ZoneRule.UNKNOWN if unsized and not via else rule
+    rule = visits.ZoneRule.PASS if exact else visits.ZoneRule.FROM
+    rule = visits.ZoneRule.UNKNOWN if unsized and not via else rule
     size = size_mm if size_mm >= 0.0 else math.nan
-    return Zone(size, 100.0, Blend.ZONE, rule)
+    return Zone(size, 100.0, visits.Blend.ZONE, rule)
 
 
 def visits_of(
     machine: TaskMachine,
     dialect: Dialect,
     arrive: Callable[[Any], Arrival],
-) -> Visits:
+) -> visits.Visits:
     """Put the arrivals into the order of the program, as columns.
 
     Args:
@@ -209,7 +203,9 @@ def _fill(
     c.curved = np.array([v.curved for v in found], bool)[owner]
     c.aux[:] = aux[owner]
     c.name[:] = c.names.of([v.goal.name for v in found])[owner]
-    shifts = [v.goal.shift if v.goal.target == Meaning.POSE else None for v in found]
+    shifts = [
+        v.goal.shift if v.goal.target == visits.Meaning.POSE else None for v in found
+    ]
     own = [-1 if one is None else c.shifts[one.shift] for one in shifts]
     c.shift = np.array(own, np.int64)[owner]
     shared = [v.goal.shared and not v.goal.is_rewritten_by_shift for v in found]
@@ -257,7 +253,7 @@ def _fill_conditions(
     """Fill what moves are carried out with, and why they must stay."""
     c, owner = columns, runs.owner
     c.condition[:] = c.conditions.of([one.conditions for one in arrivals])[owner]
-    flies = [one.conditions.zone.blend != Blend.UNSET for one in arrivals]
+    flies = [one.conditions.zone.blend != visits.Blend.UNSET for one in arrivals]
     c.fly[:] = np.array(flies, bool)[owner]
     c.config_given[:] = np.array([one.flagged for one in arrivals], bool)[owner]
     reasons = [
@@ -304,7 +300,7 @@ def _aux(found: Sequence[FoundVisit]) -> Floats:
     return aux[:, : int(used.max(initial=-1)) + 1]
 
 
-def _graph(machine: TaskMachine, order: Sequence[int], runs: _Runs) -> Graph:
+def _graph(machine: TaskMachine, order: Sequence[int], runs: _Runs) -> visits.Graph:
     """Translate origins to visits in program order: they end a run."""
     last = dict(zip(order, (runs.begin + runs.counts - 1).tolist(), strict=True))
     origins = [
@@ -328,19 +324,19 @@ BESIDE = (
 
 
 def _pin(
-    literals: Literals,
+    literals: visits.Literals,
     literal: Indices,
     pinned: Sequence[str],
     written: _Written,
     runs: _Runs,
-) -> Literals:
+) -> visits.Literals:
     """Say of literals why they must stay; what pins a run's first pins all of it."""
     texts = dict[int, str]()
     for k, why in zip(written.example.tolist(), pinned, strict=True):
         if why:
             own = literal[runs.begin[k] : runs.begin[k] + runs.counts[k]]
             texts |= dict.fromkeys(own[own >= 0].tolist(), why)
-    return replace(literals, pinned=texts_of(len(literals), texts))
+    return replace(literals, pinned=visits.texts_of(len(literals), texts))
 
 
 def _find_followed(found: Sequence[FoundVisit], written: _Written) -> Ints:
@@ -353,7 +349,7 @@ def _find_followed(found: Sequence[FoundVisit], written: _Written) -> Ints:
     for k, v in enumerate(found):
         if v.goal.slots[0] < 0 <= v.goal.follows[0]:
             none = -1 if v.goal.is_rewritten_by_shift else _NO_LITERAL
-            known = v.goal.target == Meaning.POSE and not v.goal.stays
+            known = v.goal.target == visits.Meaning.POSE and not v.goal.stays
             follows[k] = written.index.get(v.goal.point, none) if known else -1
     return follows
 

@@ -14,18 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
-from postproc.language.krl.abstract_state import (
-    CORRECTIONS,
-    NOTHING_SET,
-    PERHAPS,
-    KrlStore,
-    entry_name,
-)
-from postproc.language.krl.pose_encoding import (
-    COMPONENTS,
-    KRL_DIALECT,
-    numbers_of,
-)
+from postproc.language.krl import abstract_state, pose_encoding
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
 
@@ -83,7 +72,7 @@ class FrameReader:
     here: Scope
     tool: KrlFrame
     base: KrlFrame
-    store: KrlStore = NOTHING_SET
+    store: abstract_state.KrlStore = abstract_state.NOTHING_SET
 
     def frame(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame."""
@@ -134,7 +123,9 @@ class FrameReader:
         if not self.task.is_global(table, self.here):
             return no_frame(_DOUBLE.format(table.upper()))
         found = ZERO if entry <= 0 else self.entry(table, entry)
-        first, second = (self._correction(name, *pair) for pair in CORRECTIONS[name])
+        first, second = (
+            self._correction(name, *pair) for pair in abstract_state.CORRECTIONS[name]
+        )
         return self._product(self._product(first, found), second)
 
     def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
@@ -143,7 +134,7 @@ class FrameReader:
         if on is None:
             on = self.task.initial_switch(switch)
         found = self._read_held(frame, frame)
-        if on is False or (on == PERHAPS and found == ZERO):
+        if on is False or (on == abstract_state.PERHAPS and found == ZERO):
             return ZERO
         shown = name.upper()
         if on is not True:
@@ -165,7 +156,7 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        held = self._read_held(table, entry_name(table, number))
+        held = self._read_held(table, abstract_state.entry_name(table, number))
         if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):
@@ -236,15 +227,15 @@ def pose_of(value: object) -> Pose:
     """Convert the components of a frame, empty where it is none."""
     if not isinstance(value, KnownRecord):
         return ()
-    numbers = [value.number(name) for name in COMPONENTS[:6]]
+    numbers = [value.number(name) for name in pose_encoding.COMPONENTS[:6]]
     if any(map(math.isnan, numbers)):
         return ()
-    return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))
+    return flat(pose_encoding.KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))
 
 
 def six_numbers(frame: KrlFrame) -> list[float]:
     """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
-    return numbers_of(np.array(frame.pose).reshape(4, 4))
+    return pose_encoding.numbers_of(np.array(frame.pose).reshape(4, 4))
 
 
 UPRIGHT = 1e-6  # cosine of B up to which A and C are not told apart
@@ -264,12 +255,12 @@ def set_component(
     if isinstance(held, KrlFrame) and held.pose:
         numbers = six_numbers(held)
         upright = abs(math.cos(math.radians(numbers[4]))) < UPRIGHT
-        known = zip(COMPONENTS[:6], numbers, strict=True)
+        known = zip(pose_encoding.COMPONENTS[:6], numbers, strict=True)
         fields = {} if upright else {key: WrittenNumber(one) for key, one in known}
     elif isinstance(held, KnownRecord):
         fields = dict(held.fields)
     fields.pop(name, None)
-    if name not in COMPONENTS[:6]:
+    if name not in pose_encoding.COMPONENTS[:6]:
         return None
     if not math.isnan(value):
         fields[name] = WrittenNumber(value)

@@ -14,16 +14,8 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.modal_state import ModalState
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value
+from postproc.language.krl import abstract_state
 from postproc.language.krl import syntax as said
-from postproc.language.krl.abstract_state import (
-    CORRECTION_FRAMES,
-    NOTHING_SET,
-    PERHAPS,
-    SWITCHES,
-    TABLES,
-    KrlStore,
-    entry_name,
-)
 from postproc.language.krl.frames import (
     NUMBERS,
     ZERO,
@@ -92,7 +84,7 @@ class KrlModes(ModalState):
     halted: bool | None = False
     goes_on: bool = False
     load: tuple[float, ...] = CELL_LOAD
-    store: KrlStore = NOTHING_SET
+    store: abstract_state.KrlStore = abstract_state.NOTHING_SET
     perhaps: bool = False
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
@@ -134,8 +126,8 @@ _LAWS = {
 }
 _BOOLS = ("true", "false")
 _SWITCHED_OFF: Sequence[tuple[str, object]] = (
-    *((name, False) for name in sorted(SWITCHES)),
-    *((name, ZERO) for name in sorted(CORRECTION_FRAMES)),
+    *((name, False) for name in sorted(abstract_state.SWITCHES)),
+    *((name, ZERO) for name in sorted(abstract_state.CORRECTION_FRAMES)),
 )
 _KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
@@ -292,9 +284,11 @@ class ModeReader:
                 return replace(modes, blocked=modes.blocked | {MOVED_BASE})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._hold_component(modes, one)
-            case _ if name in TABLES:
+            case _ if name in abstract_state.TABLES:
                 return replace(modes, store=self._entry(modes, one))
-            case _ if name in CORRECTION_FRAMES | SWITCHES:
+            case _ if (
+                name in abstract_state.CORRECTION_FRAMES | abstract_state.SWITCHES
+            ):
                 return replace(modes, store=self._correction(modes, one))
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
@@ -315,7 +309,7 @@ class ModeReader:
         """Return what reads frames here."""
         return FrameReader(self.task, self.here, modes.tool, modes.base, modes.store)
 
-    def _entry(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
+    def _entry(self, modes: KrlModes, one: ir.Assignment) -> abstract_state.KrlStore:
         """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
         table, store = one.target.name, modes.store
         index = None
@@ -323,7 +317,7 @@ class ModeReader:
             index = self.task.index(one.target.steps[0], self.here)
         if index is None or len(index) != 1:
             return store.without(table)
-        key, parts = entry_name(table, index[0]), one.target.steps[1:]
+        key, parts = abstract_state.entry_name(table, index[0]), one.target.steps[1:]
         value: object | None = None
         if not self.task.is_global(table, self.here):
             return store.with_(key, value)
@@ -351,12 +345,14 @@ class ModeReader:
         found = self.frames(modes).frame(one.value)
         return None if found.why or not found.pose else found
 
-    def _correction(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
+    def _correction(
+        self, modes: KrlModes, one: ir.Assignment
+    ) -> abstract_state.KrlStore:
         """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
         name, value = one.target.name, None
         if one.target.steps or not self.task.is_global(name, self.here):
             return modes.store.with_(name, None)
-        if name in SWITCHES:
+        if name in abstract_state.SWITCHES:
             value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
             return modes.store.with_(name, value)
         found = self.frames(modes).frame(one.value)
@@ -474,7 +470,7 @@ class ModeReader:
         entry = whole(number)
         if entry is None:
             return replace(modes, load=LOST_LOAD)
-        held = modes.store.get(entry_name("load_data", entry))
+        held = modes.store.get(abstract_state.entry_name("load_data", entry))
         if isinstance(held, tuple) and "load_data" not in self.task.beside:
             return replace(modes, load=held)
         if not self.task.is_steady("load_data", entry):
@@ -531,11 +527,11 @@ class ModeReader:
         Speeds and distances are those of ``$config.dat``. The load stays what it is.
         """
         store = modes.store
-        linked = store.get(_KEPT_ON) in (True, PERHAPS)
+        linked = store.get(_KEPT_ON) in (True, abstract_state.PERHAPS)
         for name, value in _SWITCHED_OFF:
             store = store.with_(name, value)
         if linked:
-            store = store.with_(_KEPT_ON, PERHAPS)
+            store = store.with_(_KEPT_ON, abstract_state.PERHAPS)
         modes = replace(modes, store=store)
         reader = self.frames(modes)
 

@@ -16,15 +16,8 @@ from postproc.language.analysis.conditions import (
 )
 from postproc.language.analysis.found_visits import FoundGoal, not_reached
 from postproc.language.analysis.to_visits import Arrival, zone_at
+from postproc.language.krl import modal_state
 from postproc.language.krl.interpreter import KrlMachine
-from postproc.language.krl.modal_state import (
-    LOST_LOAD,
-    OF_TRACK,
-    UNKNOWN,
-    UNKNOWN_LOAD,
-    KrlModes,
-    ModeReader,
-)
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
@@ -79,16 +72,16 @@ def visits_of(machine: KrlMachine) -> Visits:
     return to_visits.visits_of(machine, KRL_DIALECT, arrive)
 
 
-def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
+def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[modal_state.KrlModes, Reason]:
     """Add what a move sets for itself; say where that is not known."""
-    modes: KrlModes = v.modes
+    modes: modal_state.KrlModes = v.modes
     given = [(v.scope, one) for one in v.move.settings]
     if v.begin >= 0:
         block = machine.texts[v.scope.file].statement(v.begin)
         assert isinstance(block, SplineBlock)
         given = [(v.scope.at(v.begin), one) for one in block.settings] + given
     for here, setting in given:
-        after = ModeReader(machine.task, here).assign(modes, setting)
+        after = modal_state.ModeReader(machine.task, here).assign(modes, setting)
         if after is None:
             text = f"{_NOT_SET}: {setting.target.name.upper()}"
             return modes, Reason(Code.SETTING_UNTRACKED, text)
@@ -110,7 +103,7 @@ def _arrive(
     active = {why for _, why in modes.active}
     blocked = modes.blocked | active | machine.everywhere | early
     if "track" not in machine.start.aux.values():
-        blocked -= OF_TRACK
+        blocked -= modal_state.OF_TRACK
     given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
     if v.goal.target != Meaning.JOINTS:
         given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
@@ -119,7 +112,9 @@ def _arrive(
         swapped = remote and modes.interpolation != "#tcp"
         given += (_SWAPPED if swapped else NO_REASON,)
     given += (_STATUS if odd else NO_REASON,)
-    given += (UNKNOWN_LOAD if modes.load == LOST_LOAD else NO_REASON,)
+    given += (
+        modal_state.UNKNOWN_LOAD if modes.load == modal_state.LOST_LOAD else NO_REASON,
+    )
     conditions = Conditions(
         tool=modes.tool.pose,
         base=base,
@@ -137,13 +132,13 @@ def _arrive(
     return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
 
 
-def _load(modes: KrlModes) -> tuple[float, ...]:
+def _load(modes: modal_state.KrlModes) -> tuple[float, ...]:
     """Return what the program states that the arm carries, see `Conditions.load`."""
-    unknown = not modes.load or modes.load == LOST_LOAD
+    unknown = not modes.load or modes.load == modal_state.LOST_LOAD
     return NO_LOAD if unknown else (*modes.load, *(math.nan,) * 3)[:4]
 
 
-def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
+def _law(v: KrlVisit, modes: modal_state.KrlModes) -> OrientationLaw:
     """Tell how the tool turns on the way."""
     if v.motion != Motion.CIRCULAR or modes.orientation != "#var":
         return modes.law
@@ -156,7 +151,7 @@ def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
     return OrientationLaw.START_TO_END if known else OrientationLaw.ALONG_PATH
 
 
-def _zone(v: KrlVisit, modes: KrlModes, end: str) -> Zone:
+def _zone(v: KrlVisit, modes: modal_state.KrlModes, end: str) -> Zone:
     """Tell how a point is passed."""
     if v.inner and not v.via:
         return zone_at(v.via, exact=True)
@@ -167,10 +162,10 @@ def _zone(v: KrlVisit, modes: KrlModes, end: str) -> Zone:
         return unsized
     words = v.move.words
     if "c_ptp" in words and "c_dis" not in words:
-        known = modes.overlap != UNKNOWN
+        known = modes.overlap != modal_state.UNKNOWN
         return zone_at(v.via, overlap=modes.overlap) if known else unsized
     by_distance = "c_dis" in words or "c_spl" in words
-    if not by_distance or modes.distance == UNKNOWN:
+    if not by_distance or modes.distance == modal_state.UNKNOWN:
         return unsized
     return zone_at(v.via, modes.distance)
 

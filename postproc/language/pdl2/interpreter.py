@@ -13,16 +13,9 @@ from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
+from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store, root_of
-from postproc.language.pdl2.calls import (
-    assign,
-    call_statement,
-    calls_in_expressions,
-    frame_value,
-    list_moves,
-    take_effects,
-)
 from postproc.language.pdl2.entries import POSITIONS, Entries
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.exported_variables import (
@@ -56,13 +49,6 @@ from postproc.language.pdl2.side_effects import (
     words_in,
 )
 from postproc.language.pdl2.to_visits import collect
-from postproc.language.pdl2.values import (
-    Nothing,
-    Position,
-    Value,
-    Vector,
-    points_of,
-)
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.text.symbol_column import NameColumn
@@ -208,7 +194,7 @@ def prepare(
         machine.paused |= here.store.last
     if _lets_others_run(statement) or text:
         let_others_run(here)
-    calls_in_expressions(machine, here, statement)
+    calls.calls_in_expressions(machine, here, statement)
 
 
 def _lets_others_run(one: ir.SourceStatement) -> bool:
@@ -227,9 +213,9 @@ def step(machine: Machine, here: Execution, statement: ir.SourceStatement) -> bo
         case ir.Assignment():
             lines = here.place.program.lines
             taught = here.world.taught_lines[lines.source.name]
-            assign(here, statement, lines.line(here.row) in taught)
+            calls.assign(here, statement, lines.line(here.row) in taught)
         case ir.Instruction():
-            return not call_statement(machine, here, statement)
+            return not calls.call_statement(machine, here, statement)
         case ast.Transfer("WRITE", operands):
             for operand in operands:
                 here.world.pin(here.value(operand), "the program writes it out")
@@ -315,7 +301,7 @@ def run_broken(machine: Machine, here: Execution) -> None:
             here.store.last = frozenset({ELSEWHERE})
             move(machine, here, said)
     inside = list_live(here.world, here.place, body.first, body.last)
-    take_effects(here, inside, f"{why}: it may be used in a computation", why)
+    calls.take_effects(here, inside, f"{why}: it may be used in a computation", why)
     here.store.forget_frames(why)
     here.store.last = frozenset({ELSEWHERE})
 
@@ -377,12 +363,12 @@ def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
         if variable.initial is None or key in world.initial:
             continue
         if why := _why_untrusted(world, key):
-            world.initial[key] = Nothing(why)
+            world.initial[key] = values.Nothing(why)
             continue
         value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
         if variable.arm not in (0, world.arm):
-            value = Nothing(points_of(variable.arm))
-        if isinstance(value, Position) and not value.name:
+            value = values.Nothing(values.points_of(variable.arm))
+        if isinstance(value, values.Position) and not value.name:
             value = replace(
                 value,
                 name=variable.name,
@@ -426,7 +412,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
             own[row] = False
             key = world.root(place, root)
             if key in world.imported:
-                world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
+                world.initial[key + name[len(root) :]] = values.Nothing(IMPORTED)
             else:
                 exported[key + name[len(root) :]] = row
     for row in named[~known[named]].tolist():
@@ -457,22 +443,22 @@ def _enter(world: World, file: ValueFile, row: int, key: str, arm: int) -> None:
     """Enter a value that is no known point, where there is any, or another arm's."""
     entries, kind = file.entries, file.entries.layout_of(row).kind
     numbers, own = entries.numbers_of(row), int(entries.arm[row])
-    value: Value | None = numbers[0]
+    value: values.Value | None = numbers[0]
     if kind in POSITIONS:
-        value = Nothing(
+        value = values.Nothing(
             f"its value is not initialised in {file.source.name}",
             code=Code.LSV_UNINITIALISED,
         )
     if kind == "VEC":
         x, y, z = numbers[:3]
-        value = Vector((x, y, z))
+        value = values.Vector((x, y, z))
     if value is None and "." in entries.name[row]:  # that it is there counts
-        value = Nothing(f"its value in {file.source.name} is no number")
+        value = values.Nothing(f"its value in {file.source.name} is no number")
     if arm or own not in (0, world.arm):
-        value = Nothing(points_of(arm or own))
+        value = values.Nothing(values.points_of(arm or own))
     if value is not None:
         why = _why_untrusted(world, root_of(key))
-        world.initial[key] = Nothing(why) if why else value
+        world.initial[key] = values.Nothing(why) if why else value
 
 
 def _why_untrusted(world: World, root: str) -> str:
@@ -563,7 +549,7 @@ def _list_moves(world: World) -> Machine:
     for place, _ in world.declarations():
         here = Execution(world, place, place.body.first, Store(lambda key: None))
         name = place.body.name or place.program.name
-        list_moves(machine, here, place, name)
+        calls.list_moves(machine, here, place, name)
     return machine
 
 
@@ -572,7 +558,7 @@ def _start(machine: Machine) -> None:
     program, start = world.main, world.start
     store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
-    store.set(**{name: frame_value(getattr(start, name), why) for name in FRAMES})
+    store.set(**{name: calls.frame_value(getattr(start, name), why) for name in FRAMES})
     if start.linear_speed is not None:
         store.set(lin_spd=start.linear_speed)
     if start.override is not None:
@@ -587,7 +573,7 @@ def _start(machine: Machine) -> None:
 def _handlers(machine: Machine, store: Store) -> None:
     """Condition handlers run at any time: nothing they change is ever known."""
     world = machine.world
-    nothing = Nothing("a condition handler runs at any time")
+    nothing = values.Nothing("a condition handler runs at any time")
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
     unknown.changing = world.changing
     unknown.given, unknown.lost = store.given, store.lost
@@ -606,7 +592,7 @@ def _handlers(machine: Machine, store: Store) -> None:
                 _cancelling_handler(machine, place, first, reach)
     for name in machine.volatile:
         if name.startswith("$"):
-            store.set(**{name[1:]: Nothing("a condition handler changes it")})
+            store.set(**{name[1:]: values.Nothing("a condition handler changes it")})
 
 
 def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool:

@@ -22,22 +22,8 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.language import Start
+from postproc.language.rapid import errors
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.errors import (
-    EXIT_CYCLE,
-    PATH_ERRORS,
-    ErrorExit,
-    ErrorHandlers,
-    Numbers,
-    begins_handler,
-    clauses_of,
-    common,
-    exits_of,
-    key_of,
-    may_be_skipped,
-    may_raise,
-    numbers_of,
-)
 from postproc.language.rapid.instructions import (
     BY_NAME,
     MOTIONS,
@@ -92,8 +78,8 @@ class RapidMachine(TaskMachine):
     goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
-    _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
-    _exits: dict[Context, tuple[ErrorExit, ...]] = field(default_factory=dict)
+    _handlers: dict[tuple[int, int], errors.ErrorHandlers] = field(default_factory=dict)
+    _exits: dict[Context, tuple[errors.ErrorExit, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -191,7 +177,7 @@ class RapidMachine(TaskMachine):
 
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
-        return begins_handler(one)
+        return errors.begins_handler(one)
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
@@ -210,7 +196,7 @@ class RapidMachine(TaskMachine):
 
     # Errors.
 
-    def _handlers_of(self, context: Context) -> ErrorHandlers:
+    def _handlers_of(self, context: Context) -> errors.ErrorHandlers:
         """Read the error handlers of a routine once."""
         place = context.place
         key = place.scope.file, place.routine.first
@@ -219,20 +205,20 @@ class RapidMachine(TaskMachine):
             text = self.texts[scope.file]
 
             def read(operand: ir.Operand | None, row: int) -> str:
-                return key_of(operand, self.task.number(operand, scope.at(row)))
+                return errors.key_of(operand, self.task.number(operand, scope.at(row)))
 
-            clauses = clauses_of(text, place.flow, read)
+            clauses = errors.clauses_of(text, place.flow, read)
             rows = place.flow.handlers
-            effects, called = self.read_rows(scope, rows, (EXIT_CYCLE,))
+            effects, called = self.read_rows(scope, rows, (errors.EXIT_CYCLE,))
             if moves := bool(effects.union(*map(self.routine_effects, called))):
                 self.beside.add((scope.file, rows.start, rows.stop))
-            self._handlers[key] = ErrorHandlers(clauses, moves)
+            self._handlers[key] = errors.ErrorHandlers(clauses, moves)
         return self._handlers[key]
 
-    def _exits_of(self, context: Context) -> tuple[ErrorExit, ...]:
+    def _exits_of(self, context: Context) -> tuple[errors.ErrorExit, ...]:
         """Find where the program goes on behind errors raised in a routine."""
         if context not in self._exits:
-            self._exits[context] = tuple(exits_of(context, self._handlers_of))
+            self._exits[context] = tuple(errors.exits_of(context, self._handlers_of))
         return self._exits[context]
 
     def _fail(self, at: At, one: ir.SourceStatement, here: Arrived) -> None:
@@ -247,11 +233,11 @@ class RapidMachine(TaskMachine):
                 continue
             if not beside:
                 self._handle(at, way, replace(here, origins=NOWHERE))
-            elif way.row and may_be_skipped(one):
+            elif way.row and errors.may_be_skipped(one):
                 self._handle(at, way, here)
 
-    def _may_raise(self, one: ir.SourceStatement, numbers: Numbers) -> bool:
-        return may_raise(one, numbers, self.task.routines, self.task.declared)
+    def _may_raise(self, one: ir.SourceStatement, numbers: errors.Numbers) -> bool:
+        return errors.may_raise(one, numbers, self.task.routines, self.task.declared)
 
     def _interrupt(self, at: At, one: ir.Instruction, here: Arrived) -> None:
         """Allow for an error that ends a move on its way."""
@@ -259,11 +245,11 @@ class RapidMachine(TaskMachine):
             one.name.startswith(PROCESSES) or "procerrrecovery" in self.task.find_calls
         )
         for way in self._exits_of(at.context):
-            named = way.numbers is not None and bool(way.numbers & PATH_ERRORS)
+            named = way.numbers is not None and bool(way.numbers & errors.PATH_ERRORS)
             if way.own and (named or (always and self._may_raise(one, way.numbers))):
                 self._handle(at, way, replace(here, origins=NOWHERE))
 
-    def _handle(self, at: At, way: ErrorExit, here: Arrived) -> None:
+    def _handle(self, at: At, way: errors.ErrorExit, here: Arrived) -> None:
         """Go on behind an error."""
         here = here.forget() if way.lost else here
         if way.context is at.context and way.own:
@@ -280,9 +266,11 @@ class RapidMachine(TaskMachine):
         if one.word != "raise":
             return
         number = self.task.number(one.value, scope_at(at))
-        raised = numbers_of([one.value], lambda value: key_of(value, number))
+        raised = errors.numbers_of(
+            [one.value], lambda value: errors.key_of(value, number)
+        )
         for way in self._exits_of(at.context):
-            shared = common(way.numbers, raised)
+            shared = errors.common(way.numbers, raised)
             if shared is None or shared:
                 self._handle(at, way, here)
 
@@ -308,7 +296,7 @@ class RapidMachine(TaskMachine):
     def may_jump(self, at: At, here: Arrived) -> None:
         """Begin a cycle as well, see `TaskMachine.may_jump`."""
         super().may_jump(at, here)
-        if EXIT_CYCLE in at.place.text.words([at.row]):
+        if errors.EXIT_CYCLE in at.place.text.words([at.row]):
             self.restarts.append(here)
 
     def _run_all_beside(self) -> None:
@@ -367,7 +355,7 @@ class RapidMachine(TaskMachine):
         kind = read_known_instructions().get(name)
         if name in WAITING or self.declares_motionless(name):
             self.pause(here)
-        if name == EXIT_CYCLE:
+        if name == errors.EXIT_CYCLE:
             self.restarts.append(here)
             return None
         if name in STOPPED:

@@ -12,6 +12,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
+from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import (
     NO_POINTS,
     Points,
@@ -23,14 +24,6 @@ from postproc.language.analysis.found_visits import (
     FoundVisit,
     explain_disagreement,
     not_reached,
-)
-from postproc.language.analysis.goals import (
-    AT_RUN_TIME,
-    COMPUTED,
-    RUN_TIME,
-    GoalReader,
-    ReadShift,
-    locate_numbers,
 )
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
 from postproc.language.rapid.instructions import MOTIONS, Signature
@@ -276,7 +269,7 @@ FLANGE = FrameOfMove(IDENTITY, True)
 
 
 @dataclass(frozen=True)
-class RapidGoal(GoalReader):
+class RapidGoal(goals.GoalReader):
     """Reads the ends of one move.
 
     Attributes:
@@ -301,9 +294,9 @@ class RapidGoal(GoalReader):
         if own != parts or tuple(map(len, own)) != counts:
             return None
         numbers = [one for part in own[:-1] for one in part]
-        file, slots = locate_numbers(numbers, WIDTH)
+        file, slots = goals.locate_numbers(numbers, WIDTH)
         goal = self._goal_of([x.value for x in numbers], [x.value for x in own[-1]])
-        why = goal.why or (NO_REASON if file >= 0 else COMPUTED)
+        why = goal.why or (NO_REASON if file >= 0 else goals.COMPUTED)
         return replace(goal, file=file, slots=slots, why=why)
 
     def _goal_of(self, numbers: list[float], outside: list[float]) -> FoundGoal:
@@ -341,7 +334,7 @@ class RapidGoal(GoalReader):
         name, arguments = operand.name, operand.arguments
         by = self.task.read_shift(arguments, self.here)
         if by is None:
-            return self.unknown(AT_RUN_TIME)
+            return self.unknown(goals.AT_RUN_TIME)
         turns = {one.name: one.value for one in arguments}
         placed = [one.value for one in arguments if not one.name]
         base = replace(self, joints=False).goal(placed[0])
@@ -351,13 +344,13 @@ class RapidGoal(GoalReader):
         own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
         if base.target != Meaning.POSE or np.isnan(by).any():
-            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
+            return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
         shift = Shift(SHIFTS[name], by, base.values)
         # x, y, z, and all angles that are there, must be written as numbers.
         given = [*written[:3], *(one for one in written[3:] if one is not None)]
         if not all(isinstance(one, ir.Num) for one in given):
             slots = [-1] * len(slots)
-        return self.apply_shift(base, ReadShift(
+        return self.apply_shift(base, goals.ReadShift(
             shift, self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
             shifts=shifts, turned=turned,
         ))  # fmt: skip
@@ -373,11 +366,11 @@ class RapidGoal(GoalReader):
             code = Code.NO_VALUE
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
-            text = f"may be changed by another task at any time: {RUN_TIME}"
+            text = f"may be changed by another task at any time: {goals.RUN_TIME}"
         elif self.task.constant(name, self.here) is None:
-            text = f"may be changed by the program: {RUN_TIME}"
+            text = f"may be changed by the program: {goals.RUN_TIME}"
         else:
-            text = f"has an element or value that is not known: {RUN_TIME}"
+            text = f"has an element or value that is not known: {goals.RUN_TIME}"
         return Reason(code, f"{name} {text}")
 
     def explain_pinned(self, name: str, file: int) -> str:
