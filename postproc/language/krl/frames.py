@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -72,7 +72,7 @@ class FrameReader:
     here: Scope
     tool: KrlFrame
     base: KrlFrame
-    store: abstract_state.KrlStore = abstract_state.NOTHING_SET
+    store: Mapping[str, object] = field(default_factory=dict)
 
     def frame(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame."""

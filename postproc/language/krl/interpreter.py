@@ -234,7 +234,7 @@ class KrlMachine(TaskMachine):
         if isinstance(one, said.InterruptDeclared | said.PathTrigger):
             return here
         own = one.target if isinstance(one, ir.Assignment) else None
-        store = here.modes.store
+        modes = here.modes
         for target in self.task.list_changes(one):
             name = target.name
             if target is own or not _is_modal(name):
@@ -242,10 +242,8 @@ class KrlMachine(TaskMachine):
             if name not in HELD:
                 what = f"hands {name.upper()} over, which may be changed"
                 return self.unknown(at, here, what)
-            store = store.without(name).with_(name, None)
-        if store == here.modes.store:
-            return here
-        return replace(here, modes=here.modes.with_(store=store))
+            modes = modes.drop(name)
+        return here if modes is here.modes else replace(here, modes=modes)
 
     def _modes(self, at: At) -> ModeReader:
         return ModeReader(self.task, scope_at(at))

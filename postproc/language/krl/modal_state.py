@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -84,7 +84,7 @@ class KrlModes(ModalState):
     halted: bool | None = False
     goes_on: bool = False
     load: tuple[float, ...] = CELL_LOAD
-    store: abstract_state.KrlStore = abstract_state.NOTHING_SET
+    store: Mapping[str, object] = field(default_factory=dict)
     perhaps: bool = False
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
@@ -95,7 +95,19 @@ class KrlModes(ModalState):
 
     def join(self, other: KrlModes) -> KrlModes:
         """Keep what is the same on another way here."""
-        return replace(super().join(other), store=self.store.join(other.store))
+        both = {k: v for k, v in self.store.items() if other.store.get(k) == v}
+        return replace(super().join(other), store=both)
+
+    def hold(self, name: str, value: object | None) -> KrlModes:
+        """Return it with what the program sets a name to; None forgets it."""
+        store = {k: v for k, v in self.store.items() if k != name}
+        return replace(self, store=store if value is None else store | {name: value})
+
+    def drop(self, name: str) -> KrlModes:
+        """Forget what the program has set a name, or any entry of a table, to."""
+        lost = [k for k in self.store if k.partition("[")[0] == name]
+        kept = {k: v for k, v in self.store.items() if k not in lost}
+        return replace(self, store=kept) if lost else self
 
     def beside(self, task: KrlTask) -> KrlModes:
         """Return it where submit programs may change what they set at any time."""
@@ -147,6 +159,18 @@ IGNORED = Reason(
     Code.EXTERNAL_AXES, "the track need not go where targets say ($EX_AX_IGNORE)"
 )
 MOVED_BASE = Reason(Code.SETTING_UNTRACKED, "$ROBROOT or $WORLD is set by the program")
+_BLOCKING = {
+    "$soft_plcl": SOFT, "$softn": SOFT, "$tech": GENERATOR, "$tech_c": GENERATOR,
+    "$load_a1": AXIS_LOAD, "$load_a2": AXIS_LOAD, "$load_a3": AXIS_LOAD,
+    "$robroot": MOVED_BASE, "$world": MOVED_BASE,
+}  # fmt: skip
+"""Variables behind whose assignment no target can be compensated, and why."""
+_WORDS = {
+    "$ipo_mode": ("interpolation", "ipo_frame"),
+    "$ori_type": ("orientation", "ori_typ"),
+    "$circ_type": ("circle", "circ_typ"),
+}
+"""Variables that are set to words: modes, and components of data with such a word."""
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
 PLANNED = frozenset(
@@ -254,12 +278,11 @@ class ModeReader:
         match name:
             case "$tool" | "$base":
                 return self._frame(modes, one)
-            case "$ipo_mode":
-                return replace(modes, interpolation=self._word(value, "ipo_frame"))
-            case "$ori_type":
-                return replace(modes, orientation=self._word(value, "ori_typ"))
-            case "$circ_type":
-                return replace(modes, circle=self._word(value, "circ_typ"))
+            case _ if name in _WORDS:
+                field_, component = _WORDS[name]
+                return modes.with_(**{field_: self._word(value, component)})
+            case _ if name in _BLOCKING:
+                return modes.with_(blocked=modes.blocked | {_BLOCKING[name]})
             case "$circ_mode":
                 return replace(modes, through=self._goes_through(one))
             case "$vel" | "$vel_axis" | "$apo":
@@ -270,26 +293,16 @@ class ModeReader:
                 return replace(modes, ahead=ahead)
             case "$load":
                 return self._load(modes, one)
-            case "$soft_plcl" | "$softn":
-                return replace(modes, blocked=modes.blocked | {SOFT})
-            case "$tech" | "$tech_c":
-                return replace(modes, blocked=modes.blocked | {GENERATOR})
-            case "$load_a1" | "$load_a2" | "$load_a3":
-                return replace(modes, blocked=modes.blocked | {AXIS_LOAD})
             case "$ex_ax_ignore":
                 off = self._number(value) == 0.0
                 rest = modes.blocked - {IGNORED}
                 return replace(modes, blocked=rest if off else rest | {IGNORED})
-            case "$robroot" | "$world":
-                return replace(modes, blocked=modes.blocked | {MOVED_BASE})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._hold_component(modes, one)
             case _ if name in abstract_state.TABLES:
-                return replace(modes, store=self._entry(modes, one))
-            case _ if (
-                name in abstract_state.CORRECTION_FRAMES | abstract_state.SWITCHES
-            ):
-                return replace(modes, store=self._correction(modes, one))
+                return self._entry(modes, one)
+            case _ if name in abstract_state.HELD:
+                return self._correction(modes, one)
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
 
@@ -309,25 +322,24 @@ class ModeReader:
         """Return what reads frames here."""
         return FrameReader(self.task, self.here, modes.tool, modes.base, modes.store)
 
-    def _entry(self, modes: KrlModes, one: ir.Assignment) -> abstract_state.KrlStore:
+    def _entry(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
-        table, store = one.target.name, modes.store
-        index = None
+        table, index = one.target.name, None
         if one.target.steps:
             index = self.task.index(one.target.steps[0], self.here)
         if index is None or len(index) != 1:
-            return store.without(table)
+            return modes.drop(table)
         key, parts = abstract_state.entry_name(table, index[0]), one.target.steps[1:]
         value: object | None = None
         if not self.task.is_global(table, self.here):
-            return store.with_(key, value)
+            return modes.hold(key, value)
         if not parts:
             value = self._entry_value(modes, one)
         elif table != "load_data":
-            value = self._component(store.get(key), parts, one.value)
+            value = self._component(modes.store.get(key), parts, one.value)
         if isinstance(value, KrlFrame) and table in self.task.taught:
             value = replace(value, taught=True)
-        return store.with_(key, value)
+        return modes.hold(key, value)
 
     def _component(
         self, held: object, parts: Sequence[str | ir.ElementStep], value: ir.Operand
@@ -345,18 +357,16 @@ class ModeReader:
         found = self.frames(modes).frame(one.value)
         return None if found.why or not found.pose else found
 
-    def _correction(
-        self, modes: KrlModes, one: ir.Assignment
-    ) -> abstract_state.KrlStore:
+    def _correction(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
         name, value = one.target.name, None
         if one.target.steps or not self.task.is_global(name, self.here):
-            return modes.store.with_(name, None)
+            return modes.hold(name, None)
         if name in abstract_state.SWITCHES:
             value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
-            return modes.store.with_(name, value)
+            return modes.hold(name, value)
         found = self.frames(modes).frame(one.value)
-        return modes.store.with_(name, None if found.why else found)
+        return modes.hold(name, None if found.why else found)
 
     def _hold_component(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
@@ -526,13 +536,10 @@ class ModeReader:
 
         Speeds and distances are those of ``$config.dat``. The load stays what it is.
         """
-        store = modes.store
-        linked = store.get(_KEPT_ON) in (True, abstract_state.PERHAPS)
+        linked = modes.store.get(_KEPT_ON) in (True, abstract_state.PERHAPS)
         for name, value in _SWITCHED_OFF:
-            store = store.with_(name, value)
-        if linked:
-            store = store.with_(_KEPT_ON, abstract_state.PERHAPS)
-        modes = replace(modes, store=store)
+            modes = modes.hold(name, value)
+        modes = modes.hold(_KEPT_ON, abstract_state.PERHAPS) if linked else modes
         reader = self.frames(modes)
 
         def number(name: str) -> float:

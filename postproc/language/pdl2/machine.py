@@ -23,7 +23,7 @@ from postproc.language.pdl2.abstract_state import (
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
-from postproc.language.pdl2.side_effects import PURE, circles, invocations, references
+from postproc.language.pdl2.side_effects import circles, list_invoked
 from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
@@ -222,10 +222,7 @@ class Machine(Interpreter[Store]):
             own: tuple[ir.Node, ...] = (statement,)
             if ir.divides(statement):
                 own = statement.values if isinstance(statement, ir.Branch) else ()
-            found = [c for c in invocations(*own) if c.name not in PURE]
-            names = {r.name for r in references(*own) if not r.steps}
-            alone = [n for n in names if self.world.is_function(place, n)]
-            found += [ir.FunctionCall(name, ()) for name in sorted(alone)]
+            found = list_invoked(self.world, place, *own)
             known = self._called[id(statement)] = tuple(found)
         return known
 

@@ -123,6 +123,14 @@ def references(*nodes: ir.Node | None) -> Iterator[ir.DataObject]:
     return (part for part in ir.walk(*nodes) if isinstance(part, ir.DataObject))
 
 
+def list_invoked(world: World, place: Place, *nodes: ir.Node) -> list[ir.FunctionCall]:
+    """List the calls in nodes that may have effects, those by a name alone, too."""
+    found = [call for call in invocations(*nodes) if call.name not in PURE]
+    names = {r.name for r in references(*nodes) if not r.steps}
+    alone = sorted(name for name in names if world.is_function(place, name))
+    return found + [ir.FunctionCall(name, ()) for name in alone]
+
+
 def list_changed_arguments(
     arguments: tuple[ir.Operand | None, ...],
 ) -> list[ir.DataObject]:
