@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import defaultdict
-from collections.abc import (
-    Callable,
-    Collection,
-    Iterable,
-    Iterator,
-    Mapping,
-    Sequence,
-)
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -22,11 +15,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.diagnostics import Code
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
-    Points,
-    Scope,
-)
+from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import (

@@ -93,9 +93,7 @@ def zone_at(
 
 
 def visits_of(
-    machine: TaskMachine,
-    dialect: Dialect,
-    arrive: Callable[[Any], Arrival],
+    machine: TaskMachine, dialect: Dialect, arrive: Callable[[Any], Arrival]
 ) -> visits.Visits:
     """Put the arrivals into the order of the program, as columns.
 

@@ -22,10 +22,7 @@ from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import visits_of
 from postproc.language.krl.user_sources import acting_sources
-from postproc.language.measuring_program import (
-    MeasuringProgram,
-    refuse_other_name,
-)
+from postproc.language.measuring_program import MeasuringProgram, refuse_other_name
 from postproc.language.text.blocks import read_once
 from postproc.language.text.source import Source
 

@@ -33,7 +33,7 @@ CELL_LOAD: tuple[float, ...] = ()
 LOST_LOAD: tuple[float, ...] = (-1.0,)
 LOST_FRAME = no_frame(
     "$TOOL and $BASE are not known here: set them after the statement that is not "
-    "followed, or in every branch that leads here",
+    "followed, or in every branch that leads here"
 )
 
 

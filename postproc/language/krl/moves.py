@@ -13,11 +13,7 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import (
-    AssignedPoint,
-    Points,
-    Scope,
-)
+from postproc.language.analysis.assigned_points import AssignedPoint, Points, Scope
 from postproc.language.analysis.found_visits import FoundGoal, FoundVisit, not_reached
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
@@ -115,11 +111,7 @@ class KrlGoals:
     aux: Collection[int] = ()
 
     def visits(
-        self,
-        move: said.KrlMove,
-        here: Scope,
-        modes: object,
-        points: Points,
+        self, move: said.KrlMove, here: Scope, modes: object, points: Points
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")

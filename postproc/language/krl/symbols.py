@@ -17,20 +17,11 @@ from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
-from postproc.language.analysis.values import (
-    KnownRecord,
-    Layout,
-    Value,
-    WrittenNumber,
-)
+from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
 from postproc.language.krl.external_routines import package_routines
-from postproc.language.krl.pose_encoding import (
-    COMMENTS,
-    COMPONENTS,
-    KRL_DIALECT,
-)
+from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.shifts import Shift, ShiftKind
 

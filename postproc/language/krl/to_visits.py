@@ -8,12 +8,7 @@ from collections.abc import Container, Mapping, Sequence
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
-from postproc.language.analysis.conditions import (
-    NO_LOAD,
-    Conditions,
-    Zone,
-    cell_pose,
-)
+from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
 from postproc.language.analysis.found_visits import FoundGoal, not_reached
 from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.krl import modal_state
@@ -38,8 +33,7 @@ _STILL_TOOL = Reason(
 _NOT_TURNED = {
     "#constant": _STILL_TOOL,
     "#ignore": Reason(
-        Code.ORIENTATION_LAW,
-        "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+        Code.ORIENTATION_LAW, "$ORI_TYPE = #IGNORE: the tool does not turn to the point"
     ),
 }
 _MAY_NOT_TURN = Reason(

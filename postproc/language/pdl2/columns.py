@@ -20,9 +20,7 @@ from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import number_in_order
-from postproc.language.visits import (
-    Meaning,
-)
+from postproc.language.visits import Meaning
 
 _COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 _UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read")

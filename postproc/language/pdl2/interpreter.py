@@ -52,13 +52,7 @@ from postproc.language.pdl2.to_visits import collect
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.visits import (
-    ELSEWHERE,
-    START,
-    Diagnostic,
-    Meaning,
-    Visits,
-)
+from postproc.language.visits import ELSEWHERE, START, Diagnostic, Meaning, Visits
 from postproc.robot.trajectory import Motion
 
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
@@ -466,9 +460,6 @@ def _why_untrusted(world: World, root: str) -> str:
     if root in world.imported:
         return IMPORTED
     return OTHERS_WRITE if root in world.changing else ""
-
-
-# From a parsed program to its visits: what it moves to, and from where.
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,6 @@ from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
 
-# What the analysis records of each arrival, before it becomes arrays.
-
 Numbers = tuple[float | None, ...]
 _NO_NUMBERS: Numbers = (None,) * 6
 

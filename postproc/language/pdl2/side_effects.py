@@ -24,8 +24,6 @@ from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Program
 from postproc.language.visits import Visits
 
-# What a statement or a routine may do, read off its text.
-
 PURE = frozenset(
     "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
     "arm_jntp arm_xtnd pos_comp_idl pos_idl_comp abs sqrt sin cos tan asin acos atan2 "

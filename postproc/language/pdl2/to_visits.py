@@ -32,8 +32,6 @@ from postproc.language.visits import (
     texts_of,
 )
 
-# What else depends on the numbers of a target than the moves that go to it.
-
 _IN_PART = "a target is computed from a part of it"
 
 
@@ -89,8 +87,6 @@ def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]
                 found[slot] = rows.start + k
     return found
 
-
-# All of it: visits in program order.
 
 MOST_AXES = 12  # auxiliary axes that are told
 
@@ -173,10 +169,7 @@ def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
 
 
 def _graph(
-    machine: Machine,
-    ordered: list[tuple[Key, MoveRun]],
-    offsets: Ints,
-    visit: Indices,
+    machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints, visit: Indices
 ) -> Graph:
     """Translate predecessor ids to visits, in CSR form."""
     origins = []

@@ -183,8 +183,7 @@ class RapidMachine(TaskMachine):
         """Leave a routine whose error handler moves."""
         if self._handlers_of(context).moves:
             here = replace(
-                here,
-                modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER}),
+                here, modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER})
             )
         return here
 

@@ -13,11 +13,7 @@ from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
-    Points,
-    Scope,
-)
+from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
@@ -28,10 +24,7 @@ from postproc.language.analysis.found_visits import (
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
 from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
-from postproc.language.rapid.pose_encoding import (
-    RAPID_DIALECT,
-    WIDTH,
-)
+from postproc.language.rapid.pose_encoding import RAPID_DIALECT, WIDTH
 from postproc.language.rapid.symbols import SHIFTS, RapidTask
 from postproc.language.shifts import IDENTITY, Pose, Shift, flat
 from postproc.language.visits import Meaning
@@ -140,11 +133,7 @@ class Goals:
     _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
 
     def visits(
-        self,
-        one: ir.Instruction,
-        scope: Scope,
-        modes: Modes,
-        points: Points,
+        self, one: ir.Instruction, scope: Scope, modes: Modes, points: Points
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         signature = MOTIONS[one.name]
@@ -195,10 +184,7 @@ class Goals:
         return (() if found == EMPTY_HAND else found), NO_REASON
 
     def _conditions(
-        self,
-        one: ir.Instruction,
-        ends: Sequence[ir.Operand | None],
-        scope: Scope,
+        self, one: ir.Instruction, ends: Sequence[ir.Operand | None], scope: Scope
     ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
         """Read tool, work object, zone [mm] and speed [m/s] of a move.
 

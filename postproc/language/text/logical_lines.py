@@ -46,9 +46,6 @@ def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[
     return Statements(source, said, shape.astype(np.int32), line, first, numbers, value)
 
 
-# The lines of a text that was read before, with other numbers.
-
-
 @dataclass(frozen=True)
 class RereadLines(Generic[T]):
     """Lines that say what they said before, but for what their numbers are worth.

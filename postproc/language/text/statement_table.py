@@ -144,9 +144,7 @@ class StatementText(Statements[T]):
 
 
 def read_text(
-    source: Source,
-    scan: Callable[[bytes], tuple[Any, ...]],
-    parse: Callable[[str], T],
+    source: Source, scan: Callable[[bytes], tuple[Any, ...]], parse: Callable[[str], T]
 ) -> StatementText[T]:
     """Read the statements of a file.
 
