@@ -227,12 +227,12 @@ class RapidMachine(TaskMachine):
         before it runs. Otherwise it changes nothing of how the arm comes there.
         """
         for way in self._exits_of(at.context):
-            beside = way.own and way.context is at.context
+            beside = way.beside(at)
             if not self._may_raise(one, way.numbers):
                 continue
             if not beside:
                 self._handle(at, way, replace(here, origins=NOWHERE))
-            elif way.row and errors.may_be_skipped(one):
+            elif beside.row > at.row and errors.may_be_skipped(one):
                 self._handle(at, way, here)
 
     def _may_raise(self, one: ir.SourceStatement, numbers: errors.Numbers) -> bool:
@@ -251,10 +251,9 @@ class RapidMachine(TaskMachine):
     def _handle(self, at: At, way: errors.ErrorExit, here: Arrived) -> None:
         """Go on behind an error."""
         here = here.forget() if way.lost else here
-        if way.context is at.context and way.own:
-            self.go_on(at.to(at.row + way.row), here)
-        elif way.context is not None:
-            self.go_on(At(way.context, way.row), here)
+        to = way.beside(at) or way.at
+        if to is not None:
+            self.go_on(to, here)
         elif way.restarts:
             self.restarts.append(here)
         else:
