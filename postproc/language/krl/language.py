@@ -20,7 +20,7 @@ from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.symbols import KrlTask
-from postproc.language.krl.to_visits import visits_of
+from postproc.language.krl.to_visits import KrlCollector
 from postproc.language.krl.user_sources import acting_sources
 from postproc.language.measuring_program import MeasuringProgram, refuse_other_name
 from postproc.language.text.blocks import read_once
@@ -75,7 +75,7 @@ class Krl(TaskLanguage):
         _refuse_doubles(files)
         task = KrlTask(files, start.taught)
         machine = follow(lambda: KrlMachine.of(task, start))
-        visits = visits_of(machine)
+        visits = KrlCollector(machine).collect()
         odd = (d for file in files for d in file.diagnostics)
         main = f"DEF {files[0].routines[0].head.name}", "program"
         return self.report(machine, visits, files, odd, main)

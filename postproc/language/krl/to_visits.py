@@ -17,7 +17,7 @@ from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
 from postproc.language.shifts import Pose
-from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
+from postproc.language.visits import Meaning, OrientationLaw, Switch
 from postproc.robot.trajectory import Motion
 
 STOP, PASS, MAYBE = "stop", "pass", "maybe"
@@ -49,21 +49,56 @@ _SWAPPED = Reason(
 _NOT_SET = "an inline setting (WITH) is not known"
 
 
-def visits_of(machine: KrlMachine) -> Visits:
-    """Put the arrivals into the order of the program, as columns."""
-    found: Sequence[KrlVisit] = machine.visits
-    _keep_orientation(machine, found)
-    _follow_partial(machine, found)
-    ends, odd = _ends(found, machine.lost), _odd_status(found)
-    base = cell_pose(machine.start.base)
-    number = {id(v): k for k, v in enumerate(found)}
+class KrlCollector(to_visits.Collector):
+    """Makes the visits of a KRL job."""
 
-    def arrive(v: KrlVisit) -> Arrival:
-        at = number[id(v)]
+    dialect = KRL_DIALECT
+
+    def __init__(self, machine: KrlMachine) -> None:
+        """Find what ways to other arrivals tell of each."""
+        found: Sequence[KrlVisit] = machine.visits
+        _keep_orientation(machine, found)
+        _follow_partial(machine, found)
+        super().__init__(machine)
+        self.krl, self.base = machine, cell_pose(machine.start.base)
+        self.ends, self.odd = _ends(found, machine.lost), _odd_status(found)
+        self.number = {id(v): k for k, v in enumerate(found)}
+
+    def arrive(self, v: KrlVisit) -> Arrival:
+        """Say what an arrival is carried out with."""
+        machine, at = self.krl, self.number[id(v)]
+        modes, unset = _effective(machine, v)
+        joint = v.motion == Motion.JOINT
+        active = {why for _, why in modes.active}
         early = machine.early.get(at, frozenset())
-        return _arrive(machine, v, base, ends[at], at in odd, early)
-
-    return to_visits.visits_of(machine, KRL_DIALECT, arrive)
+        blocked = modes.blocked | active | machine.everywhere | early
+        if "track" not in machine.start.aux.values():
+            blocked -= modal_state.OF_TRACK
+        given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
+        if v.goal.target != Meaning.JOINTS:
+            given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
+            # Frames that were set for a fixed tool hold for no other move.
+            remote = modes.tool.remote or modes.base.remote
+            swapped = remote and modes.interpolation != "#tcp"
+            given += (_SWAPPED if swapped else NO_REASON,)
+        given += (_STATUS if at in self.odd else NO_REASON,)
+        lost = modes.load == modal_state.LOST_LOAD
+        given += (modal_state.UNKNOWN_LOAD if lost else NO_REASON,)
+        conditions = Conditions(
+            tool=modes.tool.pose,
+            base=self.base,
+            uframe=modes.base.pose,
+            taught=(modes.tool.taught, False, modes.base.taught),
+            remote=modes.interpolation == "#tcp",
+            care=(Switch.ON if joint else Switch.OFF,) * 3,
+            law=_law(v, modes),
+            zone=_zone(v, modes, self.ends[at]),
+            speed=modes.speed if modes.speed > 0 else math.nan,
+            wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
+            override=modes.share if joint and modes.share > 0.0 else 1.0,
+            load=_load(modes),
+        )
+        return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
 
 
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[modal_state.KrlModes, Reason]:
@@ -81,49 +116,6 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[modal_state.KrlModes, 
             return modes, Reason(Code.SETTING_UNTRACKED, text)
         modes = after
     return modes, NO_REASON
-
-
-def _arrive(
-    machine: KrlMachine,
-    v: KrlVisit,
-    base: Pose,
-    end: str,
-    odd: bool,
-    early: frozenset[Reason],
-) -> Arrival:
-    """Say what an arrival is carried out with."""
-    modes, unset = _effective(machine, v)
-    joint = v.motion == Motion.JOINT
-    active = {why for _, why in modes.active}
-    blocked = modes.blocked | active | machine.everywhere | early
-    if "track" not in machine.start.aux.values():
-        blocked -= modal_state.OF_TRACK
-    given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
-    if v.goal.target != Meaning.JOINTS:
-        given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
-        # Frames that were set for a fixed tool hold for no other move.
-        remote = modes.tool.remote or modes.base.remote
-        swapped = remote and modes.interpolation != "#tcp"
-        given += (_SWAPPED if swapped else NO_REASON,)
-    given += (_STATUS if odd else NO_REASON,)
-    given += (
-        modal_state.UNKNOWN_LOAD if modes.load == modal_state.LOST_LOAD else NO_REASON,
-    )
-    conditions = Conditions(
-        tool=modes.tool.pose,
-        base=base,
-        uframe=modes.base.pose,
-        taught=(modes.tool.taught, False, modes.base.taught),
-        remote=modes.interpolation == "#tcp",
-        care=(Switch.ON if joint else Switch.OFF,) * 3,
-        law=_law(v, modes),
-        zone=_zone(v, modes, end),
-        speed=modes.speed if modes.speed > 0 else math.nan,
-        wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
-        override=modes.share if joint and modes.share > 0.0 else 1.0,
-        load=_load(modes),
-    )
-    return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
 
 
 def _load(modes: modal_state.KrlModes) -> tuple[float, ...]:

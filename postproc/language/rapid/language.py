@@ -21,7 +21,7 @@ from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.symbols import RapidTask, other_tasks
-from postproc.language.rapid.to_visits import visits_of
+from postproc.language.rapid.to_visits import RapidCollector
 from postproc.language.text.blocks import read_once
 from postproc.language.text.source import Source
 
@@ -57,7 +57,7 @@ class Rapid(TaskLanguage):
         task, beside = _tasks(sources, start, known)
         files = [*task.files, *beside]
         machine = follow(lambda: RapidMachine.of(task, start, beside))
-        visits = visits_of(machine)
+        visits = RapidCollector(machine).collect()
         system = frozenset(f.text.source.name for f in task.files if f.is_system)
         own = (d for file in task.files for d in file.diagnostics)
         odd = (d for d in own if d.file not in system)
