@@ -48,7 +48,7 @@ from postproc.language.pdl2.side_effects import (
     names_but_ends,
     words_in,
 )
-from postproc.language.pdl2.to_visits import collect
+from postproc.language.pdl2.to_visits import Collector
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.text.symbol_column import NameColumn
@@ -509,7 +509,7 @@ def resolve(
     _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
-    visits = collect(machine)
+    visits = Collector(machine).collect()
     machine.root.forget()
     return Resolved(visits, tuple(sorted(world.diagnostics)))
 
