@@ -107,7 +107,7 @@ BESIDE = (
 )
 
 
-class Collector(ABC):
+class TaskCollector(ABC):
     """Makes visits, n, of what a machine has found, r, in the order of the program.
 
     Attributes:

@@ -25,7 +25,6 @@ from postproc.language.analysis.task_machine import (
 )
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import HELD
-from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines
 from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modal_state import (
     HALTING,
@@ -36,10 +35,13 @@ from postproc.language.krl.modal_state import (
 )
 from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
 from postproc.language.krl.symbols import (
+    AHEAD,
+    ASSUMED,
     FUNCTIONS,
     STILL,
     KrlTask,
     list_calls,
+    package_routines,
     values_of,
 )
 from postproc.language.language import Start

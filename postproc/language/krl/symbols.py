@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -20,7 +21,6 @@ from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
-from postproc.language.krl.external_routines import package_routines
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.shifts import Shift, ShiftKind
@@ -82,6 +82,29 @@ FUNCTIONS = frozenset(
     k_root k_type k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
     """.split()
 )
+# Routines of packages that are known neither to move the arm nor to set frames.
+
+_LIST = Path(__file__).with_name("still_routines.txt")
+AHEAD = "ahead"
+ASSUMED = (
+    "is not in the available files: it is on the list of routines known neither to "
+    "move the arm nor to set frames (docs/routines.md). If it does, say so under "
+    "[routines] in the cell file, or set assume_motion"
+)
+
+
+@cache
+def package_routines() -> Mapping[str, str]:
+    """Return the shipped list: lower-case names, and what stands behind them.
+
+    >>> package_routines()["set_cd_params"], package_routines()["h50"]
+    ('ahead', '')
+    """
+    lines = (line.partition("#")[0] for line in _LIST.read_text("ascii").splitlines())
+    words = (line.split() for line in lines if line.strip())
+    return {name: " ".join(rest) for name, *rest in words}
+
+
 KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
 """Routines that change nothing of what they get."""
 

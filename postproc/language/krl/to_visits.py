@@ -49,7 +49,7 @@ _SWAPPED = Reason(
 _NOT_SET = "an inline setting (WITH) is not known"
 
 
-class KrlCollector(to_visits.Collector):
+class KrlCollector(to_visits.TaskCollector):
     """Makes the visits of a KRL job."""
 
     dialect = KRL_DIALECT

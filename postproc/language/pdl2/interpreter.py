@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
@@ -15,18 +13,10 @@ from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
 from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import FRAMES, Store, root_of
-from postproc.language.pdl2.entries import POSITIONS, Entries
-from postproc.language.pdl2.evaluate import ProgramPoint
-from postproc.language.pdl2.exported_variables import (
-    IMPORTED,
-    changing_variables,
-    find_imported_points,
-)
-from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
-from postproc.language.pdl2.kept_values import keep_values
+from postproc.language.pdl2.abstract_state import FRAMES, Store
+from postproc.language.pdl2.initial_values import fill_initial, keep_values
+from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
-    OTHERS_WRITE,
     Execution,
     Goal,
     Machine,
@@ -38,7 +28,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.moves import move
-from postproc.language.pdl2.program import Program, Variable, Variables
+from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.side_effects import (
     CallGraph,
     is_harmless,
@@ -50,8 +40,6 @@ from postproc.language.pdl2.side_effects import (
 )
 from postproc.language.pdl2.to_visits import Collector
 from postproc.language.pdl2.variable_file import VariableFile
-from postproc.language.pdl2.variable_file import VariableFile as ValueFile
-from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import ELSEWHERE, START, Diagnostic, Meaning, Visits
 from postproc.robot.trajectory import Motion
 
@@ -298,168 +286,6 @@ def run_broken(machine: Machine, here: Execution) -> None:
     calls.take_effects(here, inside, f"{why}: it may be used in a computation", why)
     here.store.forget_frames(why)
     here.store.last = frozenset({ELSEWHERE})
-
-
-# What variables hold before a program assigns them.
-
-
-def fill_initial(world: World) -> None:
-    """Enter declared initial values, constants and the variable file's values."""
-    world.changing = changing_variables(world)
-    world.imported = find_imported_points(world)
-    for place, seen in world.declarations():
-        _enter_declarations(world, place, seen)
-    if world.variables is not None and world.main.main is not None:
-        place = world.place(world.main, world.main.main)
-        _enter_all(world, place, world.variables)
-        _report_drift(world, place, world.variables)
-
-
-def _report_drift(world: World, place: Place, file: ValueFile) -> None:
-    """Say where a program and its variable file have drifted apart."""
-    for found in file.diagnostics:
-        world.diagnostics[found] = None
-    entries, names = file.entries, file.entries.row.names
-    written: Sequence[str] = entries.name.take(entries.row.rows.astype(np.int64))
-    if entries.parts:
-        bases = {base_variable(name): name.partition(".")[0] for name in written}
-        names, written = NameColumn(bases), [*bases.values()]
-    used = place.program.lines.said.tell(names)
-    declared = place.program.variables.names.find(names) >= 0
-    if used.all() and declared.all():  # as nearly always
-        return
-    unused = [written[k] for k in np.flatnonzero(~used).tolist()]
-    undeclared = [written[k] for k in np.flatnonzero(used & ~declared).tolist()]
-    if names and len(unused) == len(names):
-        _say(world, file, Code.LSV_OTHER_PROGRAM, "none of its variables is used by "
-             f"{place.program.name}: is it the file of another program?")  # fmt: skip
-    elif unused:
-        _say(world, file, Code.LSV_UNUSED, f"never used: {_some(unused)}")
-    if undeclared:
-        text = f"used by the program, but not declared there: {_some(undeclared)}"
-        _say(world, file, Code.LSV_UNDECLARED, text)
-
-
-def _say(world: World, file: ValueFile, code: Code, text: str) -> None:
-    world.diagnostics[Diagnostic(file.source.name, 1, code, text)] = None
-
-
-def _some(names: list[str]) -> str:
-    rest = f" and {len(names) - 10} more" if len(names) > 10 else ""
-    return ", ".join(names[:10]) + rest
-
-
-def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
-    """Enter the initial values of declarations, one by one: most have none."""
-    store = Store(world.initial.find)
-    for variable in (*_with_value(seen), *_with_value(place.body.variables)):
-        key = world.root(place, variable.name.lower())
-        if variable.initial is None or key in world.initial:
-            continue
-        if why := _why_untrusted(world, key):
-            world.initial[key] = values.Nothing(why)
-            continue
-        value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
-        if variable.arm not in (0, world.arm):
-            value = values.Nothing(values.points_of(variable.arm))
-        if isinstance(value, values.Position) and not value.name:
-            value = replace(
-                value,
-                name=variable.name,
-                taught=variable.taught,
-                shared=bool(variable.exported),
-            )
-        world.initial[key] = value
-
-
-def _with_value(seen: Variables) -> list[Variable]:
-    return [seen[name] for name in seen.which(lambda said: said.initial is not None)]
-
-
-def _enter_all(world: World, place: Place, file: ValueFile) -> None:
-    """Enter what a variable file says: points as columns, the rest one by one."""
-    entries, base = file.entries, world.slot_base[file.source.name]
-    places = [layout.kind in POSITIONS for layout in entries.layouts]
-    known = np.array(places, dtype=bool)[entries.layout]
-    known &= np.isfinite(entries.numbers).all(axis=1)
-    known &= np.isin(entries.arm, (0, world.arm))
-    of_other_arm = _list_rows_where(
-        lambda v: v.arm not in (0, world.arm), place.program, entries
-    )
-    known[of_other_arm] = False
-    shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
-    shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
-    named = entries.row.rows
-    own, exported = known.copy(), dict[str, int]()
-    marked = _list_rows_where(
-        lambda v: v.taught or bool(v.exported), place.program, entries
-    )
-    for row in marked:
-        name = entries.name[row].lower()
-        root = root_of(name)
-        declared = place.program.variables[root]
-        taught[row], shared[row] = (
-            declared.taught,
-            shared[row] | bool(declared.exported),
-        )
-        if known[row] and declared.exported:
-            own[row] = False
-            key = world.root(place, root)
-            if key in world.imported:
-                world.initial[key + name[len(root) :]] = values.Nothing(IMPORTED)
-            else:
-                exported[key + name[len(root) :]] = row
-    for row in named[~known[named]].tolist():
-        name = entries.name[row].lower()
-        root = root_of(name)
-        key = world.root(place, root) + name[len(root) :]
-        arm = world.other_arm(place, root)
-        _enter(world, file, row, key, arm)
-    prefix = f"{place.program.name}/"
-    world.initial.points = FilePoints(
-        prefix, own, entries, base, shared, taught, np.zeros(len(own), bool)
-    )
-    for key, row in exported.items():
-        world.initial[key] = world.initial.points.position(row)
-
-
-def _list_rows_where(
-    holds: Callable[[Variable], bool], program: Program, entries: Entries
-) -> list[int]:
-    """List the rows of variables whose declaration fulfils a condition."""
-    names = {*program.variables.which(holds)}
-    if not names:
-        return []
-    return [row for name, row in entries.row.items() if root_of(name) in names]
-
-
-def _enter(world: World, file: ValueFile, row: int, key: str, arm: int) -> None:
-    """Enter a value that is no known point, where there is any, or another arm's."""
-    entries, kind = file.entries, file.entries.layout_of(row).kind
-    numbers, own = entries.numbers_of(row), int(entries.arm[row])
-    value: values.Value | None = numbers[0]
-    if kind in POSITIONS:
-        value = values.Nothing(
-            f"its value is not initialised in {file.source.name}",
-            code=Code.LSV_UNINITIALISED,
-        )
-    if kind == "VEC":
-        x, y, z = numbers[:3]
-        value = values.Vector((x, y, z))
-    if value is None and "." in entries.name[row]:  # that it is there counts
-        value = values.Nothing(f"its value in {file.source.name} is no number")
-    if arm or own not in (0, world.arm):
-        value = values.Nothing(values.points_of(arm or own))
-    if value is not None:
-        why = _why_untrusted(world, root_of(key))
-        world.initial[key] = values.Nothing(why) if why else value
-
-
-def _why_untrusted(world: World, root: str) -> str:
-    """Say why the first value of a variable is not taken from a file, else ""."""
-    if root in world.imported:
-        return IMPORTED
-    return OTHERS_WRITE if root in world.changing else ""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ _SHIFT = Reason(
 )
 
 
-class RapidCollector(to_visits.Collector):
+class RapidCollector(to_visits.TaskCollector):
     """Makes the visits of a RAPID task."""
 
     dialect = RAPID_DIALECT
