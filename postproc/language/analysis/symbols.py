@@ -23,7 +23,6 @@ from postproc.language.analysis.assigned_points import (
     Scope,
     source_of,
 )
-from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
 from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
 from postproc.language.analysis.uses import NamesUsed, match_arguments
@@ -218,14 +217,15 @@ class TaskSymbols(ABC, Generic[F]):
         around = (one for one in self.routines_by_file[file] if row in one.inside)
         return next(around, None)
 
-    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
+    def scope_of(self, routine: TaskRoutine) -> Scope:
         """Return where the statements of a routine stand."""
-        place = self.unit(file), module, routine.head.name
+        (file, module, _), head = routine, routine.rows.head
+        place = self.unit(file), module, head.name
         named = frozenset(
-            one.name for one in routine.head.parameters
+            one.name for one in head.parameters
             if one.by_reference or (*place, one.name) not in self._own
         )  # fmt: skip
-        return Scope(file, module, routine.head.name, named)
+        return Scope(file, module, head.name, named)
 
     def scope_of_datum(self, file: int, datum: Datum) -> Scope:
         """Return where data are declared."""
@@ -380,7 +380,7 @@ class TaskSymbols(ABC, Generic[F]):
             if argument.value is not None
             and (parameter.by_reference or self._is_fixed(parameter, argument.value))
         )
-        return replace(self.scope_of(*routine), given=given)
+        return replace(self.scope_of(routine), given=given)
 
     def _is_fixed(self, parameter: ir.RoutineParameter, value: ir.Operand) -> bool:
         """Return True if a parameter is a copy of what never changes, nor does it."""
@@ -400,7 +400,7 @@ class TaskSymbols(ABC, Generic[F]):
             there: Where it stands.
         """
         pairs = match_arguments(routine.rows.head.parameters, call.arguments) or ()
-        here = self.scope_of(*routine).at(routine.rows.first)
+        here = self.scope_of(routine).at(routine.rows.first)
         for parameter, argument in pairs:
             if parameter.by_reference or argument.value is None:
                 continue
@@ -494,7 +494,7 @@ class TaskSymbols(ABC, Generic[F]):
         found = self.routine(name, here)
         if found is None:
             return False
-        scope, text = self.scope_of(*found), self.files[found.file].text
+        scope, text = self.scope_of(found), self.files[found.file].text
         said = [text.statement(row) for row in found.inside]
         parts = [one for one in ir.walk(*said) if isinstance(one, ir.DataObject)]
         places = (self.place(one.name, scope) for one in parts)

@@ -250,7 +250,7 @@ class TaskMachine(Interpreter[Arrived]):
     def _scopes_of(
         self, routine: TaskRoutine, seen: frozenset[tuple[int, int]]
     ) -> Iterator[Scope]:
-        yield self.task.scope_of(*routine)
+        yield self.task.scope_of(routine)
         head = routine.rows.head
         if not head.parameters or routine.key in seen:
             return
@@ -420,7 +420,7 @@ class TaskMachine(Interpreter[Arrived]):
         if found is None and (name in self.task.routines or not still):
             what = f"calls the function {name}, which is not known: it may move"
         elif found is not None and self.routine_effects(found):
-            self.run_beside(found.file, found.rows)
+            self.run_beside(found)
             what = f"calls the function {name}, which moves: it is not followed"
         return self.unknown(at, here, what) if what else here
 
@@ -431,17 +431,16 @@ class TaskMachine(Interpreter[Arrived]):
 
         What holds behind such a call is not known.
         """
-        file, _, routine = found
         if self._is_recursive(found):
-            self.run_beside(file, routine)
+            self.run_beside(found)
         calls = [one for one in calls_around(at.context) if one.place is not None]
-        running = next((one for one in calls if one.place.routine is routine), None)
+        running = next((one for one in calls if one.place.routine is found.rows), None)
         if running is not None:
             begin = At(running, running.place.flow.first)
             self.enter(begin, self.at_call(running, here))
             return self.unknown(at, here, RECURSIVE)
         if len(calls) >= DEEPEST:
-            self.run_beside(file, routine)
+            self.run_beside(found)
             return self.unknown(at, here, RECURSIVE)
         self.call_routine(found, at, here)
         return None
@@ -472,7 +471,7 @@ class TaskMachine(Interpreter[Arrived]):
 
     def _place_of(self, found: TaskRoutine, caller: At | None) -> TaskPlace:
         """Return where the statements of a routine stand that is called."""
-        file, module, routine = found
+        file, _, routine = found
         key, text = (file, routine.first), self.texts[file]
         if key not in self._flows:
             rows = text.where(is_structural, routine.first + 1, routine.last)
@@ -481,7 +480,7 @@ class TaskMachine(Interpreter[Arrived]):
         scope = None
         if caller and (call := self._call_of(found, caller)) is not None:
             scope = self.task.bind(found, call, scope_at(caller))
-        scope = scope or self.task.scope_of(file, module, routine)
+        scope = scope or self.task.scope_of(found)
         return TaskPlace(scope, routine, self._flows[key], text, self.offsets[file])
 
     def _call_of(self, found: TaskRoutine, caller: At) -> ir.Instruction | None:
@@ -579,7 +578,7 @@ class TaskMachine(Interpreter[Arrived]):
     def _is_own(self, name: str, file: int, row: int) -> bool:
         """Return True for data that the routine around a statement declares anew."""
         routine = self.task.routine_around(file, row)
-        found = routine and self.task.datum(name, self.task.scope_of(*routine))
+        found = routine and self.task.datum(name, self.task.scope_of(routine))
         return bool(found and found[1].routine and found[1].kind != "pers")
 
     def pause(self, here: Arrived) -> None:
@@ -627,7 +626,7 @@ class TaskMachine(Interpreter[Arrived]):
     def _read_routine(self, routine: TaskRoutine) -> tuple[Effects, list[TaskRoutine]]:
         """Read once what the statements of a routine do, and what they call."""
         if routine.key not in self._read:
-            here = self.task.scope_of(*routine)
+            here = self.task.scope_of(routine)
             self._read[routine.key] = self.read_rows(here, routine.inside)
         return self._read[routine.key]
 
@@ -664,16 +663,16 @@ class TaskMachine(Interpreter[Arrived]):
 
     # What runs, and is not followed.
 
-    def run_beside(self, file: int, routine: HeadedRows) -> None:
+    def run_beside(self, routine: TaskRoutine) -> None:
         """Note a routine that runs at a time, or in a way, that is not followed."""
-        self.beside.add((file, routine.first, routine.last))
+        self.beside.add((routine.file, routine.rows.first, routine.rows.last))
 
     def run_named_beside(self, name: str) -> None:
         """Note all routines of a name."""
-        for file, _, routine in self.task.routines.get(name, ()):
-            self.run_beside(file, routine)
+        for routine in self.task.routines.get(name, ()):
+            self.run_beside(routine)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+    def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return the routines that a statement may call."""
         names = {*self.names_called(one)}
         return [found for name in names for found in self.task.routines.get(name, ())]
@@ -714,7 +713,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Yield the routines that some statements call."""
         file, first, behind = part
         for row in range(first, behind):
-            for at, _, one in self.calls_of(file, self.texts[file].statement(row)):
+            for at, _, one in self.calls_of(self.texts[file].statement(row)):
                 yield at, one.first, one.last
 
     def find_unreached(self) -> dict[str, Ints]:

@@ -325,7 +325,7 @@ class KrlMachine(TaskMachine):
         """Declare an interrupt; one that nothing switches on may be on already."""
         self._met.add((at.place.scope.file, at.row))
         effects = self.effects_of(one.action, at.place.scope)
-        self._call_beside(at.place.scope.file, one.action)
+        self._call_beside(one.action)
         modes, number = here.modes, self._number_of(scope_at(at), one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
@@ -473,21 +473,21 @@ class KrlMachine(TaskMachine):
         """
         if not self.effects_of(one.action, at.place.scope):
             return here
-        self._call_beside(at.place.scope.file, one.action)
+        self._call_beside(one.action)
         return replace(
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
 
-    def _call_beside(self, file: int, action: ir.SourceStatement) -> None:
+    def _call_beside(self, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
-        for at, _, called in self.calls_of(file, action):
-            self.run_beside(at, called)
+        for called in self.calls_of(action):
+            self.run_beside(called)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+    def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return what an interrupt calls later, too."""
         if isinstance(one, said.InterruptDeclared):
             one = one.action
-        return super().calls_of(file, one)
+        return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement says what is done at another time."""

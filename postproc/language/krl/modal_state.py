@@ -380,12 +380,10 @@ class ModeReader:
     def _number(self, operand: ir.Operand | None) -> float:
         return self.task.number(operand, self.here)
 
-    def _argument(self, operand: ir.Operand, at: int = 0) -> ir.Operand | None:
-        """Return an argument of a function, None where it is not there."""
-        if not isinstance(operand, ir.FunctionCall):
-            return None
-        given = operand.arguments
-        return given[at].value if at < len(given) else None
+    def _argument(self, operand: ir.Operand) -> ir.Operand | None:
+        """Return the first argument of a function, None where it is not there."""
+        given = operand.arguments if isinstance(operand, ir.FunctionCall) else ()
+        return given[0].value if given else None
 
     def _record(self, operand: ir.Operand | None) -> KnownRecord:
         found = self.task.value(operand, self.here)

@@ -135,7 +135,7 @@ class RapidMachine(TaskMachine):
         modal = {name for name, kind in known.items() if kind == "modal"}
         modal -= {*self.task.routines, *STOPPED}
         for routine in (r for own in self.task.routines.values() for r in own):
-            scope, rows = self.task.scope_of(*routine), routine.inside
+            scope, rows = self.task.scope_of(routine), routine.inside
             text = self.texts[routine.file]
             for row in text.where(
                 lambda one: getattr(inside(one), "name", "") in modal,
@@ -299,15 +299,15 @@ class RapidMachine(TaskMachine):
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""
-        for file, _, routine in self._procedures():
-            self.run_beside(file, routine)
+        for routine in self._procedures():
+            self.run_beside(routine)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+    def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return all procedures where a text names the one that is called."""
         inner = inside(one)
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
             return self._procedures()
-        return super().calls_of(file, one)
+        return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a move calls a procedure on its way."""
@@ -413,7 +413,7 @@ class RapidMachine(TaskMachine):
         """Return the modes that a procedure may set; None where it may move the arm."""
         if not self.routine_effects(routine):
             return frozenset()
-        scope, found = self.task.scope_of(*routine), set[tuple[str, Any]]()
+        scope, found = self.task.scope_of(routine), set[tuple[str, Any]]()
         for row in routine.inside:
             one = self.texts[routine.file].statement(row)
             effects, called = self.read_calls(functions_in(one), scope)

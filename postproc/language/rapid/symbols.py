@@ -123,7 +123,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     ) -> Scope | None:
         """Add no argument where data are changed by their names in texts."""
         bound = super().bind(routine, call, there)
-        return self.scope_of(*routine) if self.sets_by_string and bound else bound
+        return self.scope_of(routine) if self.sets_by_string and bound else bound
 
     def is_taught(self, name: str, found: Value | None) -> bool:
         """Return True if data were taught, by the cell or a comment on their line.
