@@ -251,7 +251,10 @@ class GoalReader(ABC):
         shift = goal.shift
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
-        return replace(goal, name=name, pins=pins, shift=shift)
+        doubtful = goal.doubtful
+        if goal.target == Meaning.UNKNOWN and held.operand is not None:
+            doubtful |= self.task.names_of(held.operand)
+        return replace(goal, name=name, pins=pins, shift=shift, doubtful=doubtful)
 
     def _set_components(
         self, held: AssignedPoint, base: FoundGoal, name: str, pins: str
