@@ -205,7 +205,7 @@ def spell(numbers: Floats, decimals: Sequence[int]) -> list[str]:
     return [f"{x:.{d}f}" for x, d in zip(numbers, decimals, strict=True)]
 
 
-def split_arguments(text: str, quote: str = '"') -> list[Span]:
+def split_arguments(text: str) -> list[Span]:
     """Split a text at its commas outside of brackets and strings, blanks stripped.
 
     Raises:
@@ -216,7 +216,7 @@ def split_arguments(text: str, quote: str = '"') -> list[Span]:
     """
     depth, quoted, ends = 0, False, [-1]
     for at, sign in enumerate(text):
-        quoted ^= sign == quote
+        quoted ^= sign == '"'
         if not quoted:
             depth += (sign in "([{") - (sign in ")]}")
             if sign == "," and depth == 0:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
+from postproc.robot.pose import MM
 
 BESIDE = np.deg2rad(0.1)  # of a border of flags [rad]
 STRAIGHT = 0.02  # sine of axis 5
@@ -76,6 +78,7 @@ class Dialect(ABC):
         flag_step: From one border to the next [rad]; one of them is 0.
         sign_flags: Flags name the signs of axes, also of axes near 0.
         flag_columns: Which numbers of a pose are flags.
+        orientation: .. and which say its orientation.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
         runs_alone: What runs beside a program is read with it: a point that other
@@ -89,6 +92,7 @@ class Dialect(ABC):
     flag_step: float = 2 * np.pi
     sign_flags: bool = False
     flag_columns: tuple[int, ...] = ()
+    orientation: ClassVar = slice(3, 6)
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
 
@@ -113,11 +117,23 @@ class Dialect(ABC):
         """Return numbers of a pose that none is longer than as it is written, (w,)."""
         return (WIDEST,) * self.width
 
-    @abstractmethod
     def poses(self, values: Floats) -> Floats:
         """Return the poses (k, 4, 4) [m] that numbers (k, w) say."""
+        values = np.asarray(values, dtype=float)
+        T = np.zeros((*values.shape[:-1], 4, 4))
+        T[..., :3, :3] = self.rotations(values[..., self.orientation])
+        T[..., :3, 3] = values[..., :3] * MM
+        T[..., 3, 3] = 1.0
+        return T
 
     @abstractmethod
+    def rotations(self, written: Floats) -> Floats:
+        """Return the rotations (k, 3, 3) that numbers for the orientation say."""
+
+    @abstractmethod
+    def orientations(self, R: Floats, near: Floats) -> Floats:
+        """Return the numbers of rotations (k, 3, 3), next to others."""
+
     def rotate(self, values: Floats, by: Floats) -> Floats:
         """Turn targets, and write them next to what is written.
 
@@ -125,6 +141,10 @@ class Dialect(ABC):
             values: Numbers of poses, (k, w).
             by: Rotations in the frame of the numbers, (k, 3, 3).
         """
+        out, written = np.array(values), values[:, self.orientation]
+        new = self.orientations(by @ self.rotations(written), written)
+        out[:, self.orientation] = new
+        return out
 
     def count_flags(self, values: Floats, q: Floats) -> Floats:
         """Write the flags of new poses, as far as they depend on more than the branch.
@@ -156,10 +176,7 @@ class Dialect(ABC):
         a, c = np.arctan2(-R[:, 1, 2], R[:, 2, 2]), np.arctan2(-R[:, 0, 1], R[:, 0, 0])
         one = np.rad2deg(np.stack([a, b, c], axis=1))
         other = np.array([180.0, 180.0, 180.0]) + one * np.array([1.0, -1.0, 1.0])
-        both = np.stack([one, other])
-        both -= 360.0 * np.round((both - near) / 360.0)
-        gap = np.abs(both - near).max(axis=2)
-        return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))
+        return nearer(one, other, near, 360.0)
 
     @abstractmethod
     def flags(
@@ -177,7 +194,6 @@ class Dialect(ABC):
             not written: the angle is within half a turn of so many turns.
         """
 
-    @abstractmethod
     def flag_words(self, config: str, values: Floats) -> str:
         """Spell the flags of one target as ``S E W T1:0 T2:-1 T3:0``, unsaid ones not.
 
@@ -187,6 +203,12 @@ class Dialect(ABC):
             config: Its configuration string.
             values: Its numbers, (w,).
         """
+        slot, turns = self.flags(np.zeros(1, dtype=np.int64), (config,), values[None])
+        words = [w for w, bit in (("S", 2), ("E", 1), ("W", 4)) if slot[0] & bit]
+        for k, turn in enumerate(turns[0], start=1):
+            said = ("<0" if turn < 0 else ">0") if self.sign_flags else f"{turn:g}"
+            words += [f"T{k}:{said}"] if turn == turn else []
+        return " ".join(words)
 
     def rewrite_flags(self, values: Floats, q: Floats, before: Floats) -> Floats:
         """Write the flags anew of poses (k, w) that the arm reaches with joints (k, 6).
@@ -230,3 +252,18 @@ class Dialect(ABC):
         arguments see `near_border`.
         """
         return np.zeros(q.shape)
+
+
+def nearer(one: Floats, other: Floats, near: Floats, turn: float) -> Floats:
+    """Return the angles, of two (k, 3) that say the same, which are next to others.
+
+    Args:
+        one: Angles.
+        other: .. and other ones.
+        near: What they are to be next to, (k, 3).
+        turn: A whole turn, in the unit of all of them.
+    """
+    both = np.stack([one, other])
+    both -= turn * np.round((both - near) / turn)
+    gap = np.abs(both - near).max(axis=2)
+    return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))

@@ -13,7 +13,7 @@ from postproc.calibration.effect_selection import fit_survey, model_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
-from postproc.language.krl.pose_encoding import abc_from_rotation
+from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.model.model import Model
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
@@ -89,7 +89,7 @@ def tool_pose() -> np.ndarray:
 
 def frame(T: np.ndarray) -> str:
     """Write a pose as KRL does."""
-    abc = np.rad2deg(abc_from_rotation(T[None, :3, :3], np.zeros((1, 3)))[0])
+    abc = KRL_DIALECT.orientations(T[None, :3, :3], np.zeros((1, 3)))[0]
     numbers = [*(T[:3, 3] * 1000.0), *abc]
     pairs = zip("XYZABC", numbers, strict=True)
     return "{" + ",".join(f"{name} {value:.4f}" for name, value in pairs) + "}"

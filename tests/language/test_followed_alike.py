@@ -20,6 +20,7 @@ PERS tooldata t:=[TRUE,[[0,0,300],[1,0,0,0]],[80,[0,0,100],[1,0,0,0],0,0,0]];
 CONST robtarget p1:=[[1,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
 CONST robtarget p2:=[[2,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
 VAR robtarget v;
+VAR robtarget s{2};
 VAR num n;
 VAR num k;
 VAR num m;
@@ -34,6 +35,7 @@ KRL = """DEF job( )
 DECL INT n
 DECL INT k
 DECL E6POS v
+DECL E6POS s[2]
 $TOOL={X 0,Y 0,Z 300,A 0,B 0,C 0}
 $BASE={X 600,Y 0,Z 800,A 0,B 0,C 0}
 %s
@@ -50,6 +52,7 @@ PDL2 = """PROGRAM job
 VAR
   n, k, m : INTEGER
   p1, p2, v : POSITION
+  s : ARRAY[2] OF POSITION
 %s
 BEGIN
   $TOOL := POS(0, 0, 300, 0, 0, 0, '')
@@ -181,6 +184,8 @@ def _say(language: str, line: str) -> str:
         if len(rest) == 3:
             parts = line.split(" ", 1)[1].split(" := ")
         parts = [part.replace("input", words["input"]) for part in parts]
+        if language == "rapid":
+            parts = [part.replace("[", "{").replace("]", "}") for part in parts]
         if begin == "frame" and language != "rapid":
             parts = [FRAME_Y[parts[0]]]
         return text.format(*parts)
@@ -204,6 +209,26 @@ def test_equal_frames_on_two_ways(language: str, bench_cell: Cell) -> None:
     lines = branch("frame 3", other=("frame 1",))
     wanted = [Code.FRAME_UNKNOWN]
     assert codes(visits(bench_cell, language, *lines, "go p1")) == wanted
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_an_element_that_is_a_copy_of_what_is_not_known_holds_its_numbers(
+    language: str, bench_cell: Cell
+) -> None:
+    either = ("set v := p1", *branch("set v := p2", "go v"))
+    found = visits(bench_cell, language, *either, "set s[1] := v", "go s[1]", "go p1")
+    assert codes(found)[1] and found.target.literal[1] == -1
+    moved = found.target.literal[[0, 2]]
+    assert (moved >= 0).all() and all(found.literals.pinned[k] for k in moved)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_an_element_that_only_the_run_tells_holds_all_of_them(
+    language: str, bench_cell: Cell
+) -> None:
+    two = "set s[1] := p1", "set s[2] := p2"
+    found = visits(bench_cell, language, *two, "set v := s[m]", "go v", "go s[1]")
+    assert codes(found)[0] and found.literals.pinned[found.target.literal[1]]
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

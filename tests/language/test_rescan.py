@@ -4,8 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from postproc import _native
 from postproc.exceptions import ProgramError
-from postproc.language.text.lexer import rescan_lines, scan_lines
+from postproc.language.text.lexer import scan_lines
 from postproc.language.text.logical_lines import read_lines, reread_lines
 from postproc.language.text.source import Source
 from tests.language.test_masking import TEXT
@@ -68,7 +69,8 @@ def rescanned(before: bytes, after: bytes) -> bool:
     """Tell whether a text is taken for another with other numbers."""
     starts = [Source("x", data).line_starts for data in (before, after)]
     count = len(scan_lines(before, starts[0]).numbers)
-    return rescan_lines((before, starts[0]), (after, starts[1]), count) is not None
+    found = _native.rescan_lines(before, starts[0], after, starts[1], count)
+    return found is not None
 
 
 def test_anything_else_is_not_taken_for_the_same() -> None:

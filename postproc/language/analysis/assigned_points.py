@@ -37,8 +37,8 @@ class AssignedPoint:
 
     Attributes:
         place: File, module and routine that declare the point, and its name.
-        operand, row, scope: What it is given whole, None where that is not known, and
-            where that stands.
+        operand, scope: What it is given whole, None where that is not known, and where
+            that stands.
         index: Of the element, () for a point.
         components: What is set in it by itself since then, by name.
         copied: Points that it is a copy of, by their places.
@@ -47,7 +47,6 @@ class AssignedPoint:
 
     place: Place
     operand: ir.Operand | None
-    row: int
     scope: Scope
     index: tuple[int, ...] = ()
     components: tuple[Component, ...] = ()
@@ -192,9 +191,10 @@ class Scope:
         module, routine: Names, "" outside of all.
         parameters: Of the routine.
         loops: Values of loop variables that are known.
-        given: What the routine is called with, by parameter: the operand, its row and
-            where that stands. Parameters without an entry are not known.
+        given: What the routine is called with, by parameter: the operand, and where
+            that stands. Parameters without an entry are not known.
         points: What points hold that assignments have changed, where a move is read.
+        row: The statement, -1 where a whole routine is meant.
     """
 
     file: int
@@ -202,8 +202,13 @@ class Scope:
     routine: str
     parameters: frozenset[str] = frozenset()
     loops: tuple[tuple[str, float], ...] = ()
-    given: tuple[tuple[str, ir.Operand, int, Scope], ...] = ()
+    given: tuple[tuple[str, ir.Operand, Scope], ...] = ()
     points: Points = NO_POINTS
+    row: int = -1
+
+    def at(self, row: int) -> Scope:
+        """Return where another statement of the routine stands."""
+        return replace(self, row=row)
 
 
 @dataclass(frozen=True)

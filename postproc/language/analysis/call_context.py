@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import total_ordering
-from typing import Any
+from typing import Any, NamedTuple
 
 CALLED, HANDLED, HERE = -1, -3, -2
 
@@ -75,6 +75,11 @@ class Context:
         return self.kind >= 0
 
     @property
+    def begun_at(self) -> At:
+        """The call or the loop that it is inside of."""
+        return At(self.outer, self.at - self.outer.place.offset)
+
+    @property
     def call(self) -> Context:
         """The call of the routine in whose loops this is, or itself."""
         one = self
@@ -96,6 +101,37 @@ class Context:
         while one.depth > depth:
             one = one._jump if one._jump.depth >= depth else one.outer
         return one
+
+
+class At(NamedTuple):
+    """A row of a routine, and the calls and rounds that have led to it."""
+
+    context: Context
+    row: int
+
+    @property
+    def place(self) -> Any:
+        """Where the statements of the routine stand."""
+        return self.context.place
+
+    @property
+    def statement(self) -> Any:
+        """What the row says."""
+        return self.context.place.statement(self.row)
+
+    @property
+    def job_row(self) -> int:
+        """The job-wide index of the row."""
+        return int(self.context.place.offset + self.row)
+
+    @property
+    def behind(self) -> At:
+        """The row behind it."""
+        return At(self.context, self.row + 1)
+
+    def to(self, row: int) -> At:
+        """Return another row of the routine."""
+        return At(self.context, row)
 
 
 def split_contexts(a: Context, b: Context) -> tuple[Context, Context]:

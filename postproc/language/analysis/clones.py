@@ -123,7 +123,7 @@ class TaskCloner(Cloner):
         routine = self.task.routine_around(file, row)
         if routine is None:
             raise CloneError("the move stands outside of any routine")
-        scope = self.task.scope_of(*routine)
+        scope = self.task.scope_of(routine)
         place = self.task.place(data.name, scope)
         found = self.task.datum(data.name, scope)
         if place is None or found is None:

@@ -11,17 +11,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Interned, Ints, is_one_value, slim
+from postproc.language import visits
 from postproc.language.shifts import Pose, flat
-from postproc.language.visits import (
-    Blend,
-    FrameColumns,
-    MotionColumns,
-    OrientationLaw,
-    SpeedColumns,
-    Switch,
-    ZoneColumns,
-    ZoneRule,
-)
 from postproc.robot.pose import pose_from_record
 
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
@@ -44,8 +35,8 @@ class Zone:
 
     size_mm: float = math.nan
     overlap_percent: float = math.nan
-    blend: int = Blend.UNSET
-    rule: int = ZoneRule.UNSET
+    blend: int = visits.Blend.UNSET
+    rule: int = visits.ZoneRule.UNSET
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +65,11 @@ class Conditions:
     uframe: Pose = ()
     taught: tuple[bool, bool, bool] = (False, False, False)
     remote: bool = False
-    care: tuple[Switch, Switch, Switch] = (Switch.UNSET,) * 3
+    care: tuple[visits.Switch, visits.Switch, visits.Switch] = (
+        visits.Switch.UNSET,
+    ) * 3
     nearest_turn: bool = False
-    law: OrientationLaw = OrientationLaw.UNSET
+    law: visits.OrientationLaw = visits.OrientationLaw.UNSET
     wrist: bool = False
     zone: Zone = Zone()
     speed: float = math.nan
@@ -106,12 +99,12 @@ class ConditionColumns:
         self._held, self._rows = [*table], rows
         self._used = np.flatnonzero(np.bincount(rows, minlength=len(self._held)))
 
-    def frame(self) -> FrameColumns:
+    def frame(self) -> visits.FrameColumns:
         """Return the frames, each of them once."""
         poses = Interned[tuple[Pose, bool]]()
         index = np.array([_number(poses, c) for c in self._held], np.int32)
         tool, base, uframe = index.reshape(-1, 3).T
-        return FrameColumns(
+        return visits.FrameColumns(
             tool=self._spread(tool),
             base=self._spread(base),
             uframe=self._spread(uframe),
@@ -120,11 +113,11 @@ class ConditionColumns:
             tool_remote=self._each(lambda c: c.remote, bool),
         )
 
-    def motion(self, own: VisitMotion) -> MotionColumns:
+    def motion(self, own: VisitMotion) -> visits.MotionColumns:
         """Return how the arm moves."""
         loads = Interned[tuple[float, ...]]([NO_LOAD])
         care = np.array([c.care for c in self._held], np.int8).reshape(-1, 3)
-        return MotionColumns(
+        return visits.MotionColumns(
             **{name: slim(column) for name, column in vars(own).items()},
             nearest_turn=self._each(lambda c: c.nearest_turn, bool),
             care=self._spread(care),
@@ -135,18 +128,18 @@ class ConditionColumns:
             loads=np.array([*loads], float),
         )
 
-    def zone(self) -> ZoneColumns:
+    def zone(self) -> visits.ZoneColumns:
         """Return how targets are passed."""
-        return ZoneColumns(
+        return visits.ZoneColumns(
             size_mm=self._each(lambda c: c.zone.size_mm, float),
             overlap_percent=self._each(lambda c: c.zone.overlap_percent, float),
             blend=self._each(lambda c: c.zone.blend, np.int8),
             rule=self._each(lambda c: c.zone.rule, np.int8),
         )
 
-    def speed(self) -> SpeedColumns:
+    def speed(self) -> visits.SpeedColumns:
         """Return how fast the arm moves."""
-        return SpeedColumns(
+        return visits.SpeedColumns(
             linear=self._each(lambda c: c.speed, float),
             turning=self._each(lambda c: c.turning, float),
             override=self._each(lambda c: c.override, float),

@@ -213,7 +213,7 @@ class FoundVisit:
     """One arrival, as it is found.
 
     Attributes:
-        scope, row: The move.
+        scope: Where the move stands.
         motion, via: `Motion`, and whether it is the point of an arc.
         goal: Where it goes.
         modes: What holds there.
@@ -229,7 +229,6 @@ class FoundVisit:
     """
 
     scope: Scope
-    row: int
     motion: Motion
     via: bool
     goal: FoundGoal
@@ -242,6 +241,11 @@ class FoundVisit:
     count: int = 1
     agreed: bool = True
     taken: frozenset[AssignedPoint] = frozenset()
+
+    @property
+    def row(self) -> int:
+        """The row of the move in its file."""
+        return self.scope.row
 
     def meet(self, other: Self) -> None:
         """Forget what it is carried out with otherwise on another way here."""

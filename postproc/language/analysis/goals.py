@@ -60,7 +60,7 @@ class GoalReader(ABC):
 
     Attributes:
         task: What names mean.
-        row, here: Where the move stands.
+        here: Where the move stands.
         dialect: What numbers of targets mean.
         brackets: Around the index of an element.
         shout: Names are upper case in messages.
@@ -68,7 +68,6 @@ class GoalReader(ABC):
     """
 
     task: TaskSymbols[Any]
-    row: int
     here: Scope
     dialect: ClassVar[Dialect]
     brackets: ClassVar[str]
@@ -126,14 +125,14 @@ class GoalReader(ABC):
         """Return a destination that is not known."""
         return FoundGoal(Meaning.UNKNOWN, self.nothing, name=name, why=why)
 
-    def at(self: G, row: int, here: Scope) -> G:
+    def at(self: G, here: Scope) -> G:
         """Return what reads operands that stand elsewhere."""
-        return replace(self, row=row, here=here)
+        return replace(self, here=here)
 
     def end(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a destination, and note what it takes of assigned points."""
         watched = self.here.points.watch()
-        goal = self.at(self.row, replace(self.here, points=watched)).goal(operand)
+        goal = self.at(replace(self.here, points=watched)).goal(operand)
         return replace(goal, given=watched.given) if watched.given else goal
 
     def goal(self, operand: ir.Operand | None) -> FoundGoal:
@@ -142,7 +141,7 @@ class GoalReader(ABC):
 
     def plain_goal(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a destination that every language has."""
-        held = self.task.find_held(operand, self.row, self.here)
+        held = self.task.find_held(operand, self.here)
         if held is not None:
             return self._read_held(held)
         found = self._read(operand)
@@ -157,8 +156,8 @@ class GoalReader(ABC):
             if isinstance(operand, ir.FunctionCall):
                 return self._read_returned(operand)
             return self.read_point(operand)
-        _, operand, row, here = passed[-1]  # given to a routine, which may read it
-        found = self.at(row, here).goal(operand)
+        _, operand, here = passed[-1]  # given to a routine, which may read it
+        found = self.at(here).goal(operand)
         why = (self.explain_pinned(name, -1) for name in sorted({p[0] for p in passed}))
         pins = next(filter(None, why), found.pins)
         if found.shift is None:
@@ -169,11 +168,11 @@ class GoalReader(ABC):
 
     def _read_returned(self, call: ir.FunctionCall) -> FoundGoal:
         """Read what a function of the task returns: its numbers stay."""
-        returned = self.task.find_returned(call, self.row, self.here)
+        returned = self.task.find_returned(call, self.here)
         if returned is None:
             return self.unknown(AT_RUN_TIME)
-        operand, row, here = returned
-        found = self.at(row, here).goal(operand)
+        operand, here = returned
+        found = self.at(here).goal(operand)
         name = call.name.upper() if self.shout else call.name
         text = f"the function {name} returns the target"
         why = found.why or Reason(Code.COMPUTED_TARGET, text)
@@ -186,7 +185,7 @@ class GoalReader(ABC):
     def read_point(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, ir.DataObject) else ""
-        goal = self.read_value(self.task.value(operand, self.row, self.here), name)
+        goal = self.read_value(self.task.value(operand, self.here), name)
         if goal is None:
             why = self.explain_unknown(name) if name else AT_RUN_TIME
             return self.unknown(why, name)
@@ -207,7 +206,7 @@ class GoalReader(ABC):
 
         Other data that it is built from may serve other points and sums too.
         """
-        file, row = self.here.file, self.row
+        file, row = self.here.file, self.here.row
         if isinstance(operand, ir.DataObject):
             index = next(filter(None, map(self._index, operand.steps)), ())
             found = self.task.constant(operand.name, self.here, index)
@@ -219,7 +218,7 @@ class GoalReader(ABC):
         return all(first <= slot < behind for slot in goal.slots if slot >= 0)
 
     def _index(self, step: str | ir.ElementStep) -> tuple[int, ...] | None:
-        return self.task.index(step, self.row, self.here)
+        return self.task.index(step, self.here)
 
     def _spell_steps(self, operand: ir.Operand | None) -> str:
         """Spell which element or component is meant, "" where it is the whole."""
@@ -235,13 +234,13 @@ class GoalReader(ABC):
 
     def _read_held(self, held: AssignedPoint) -> FoundGoal:
         """Read the destination that assignments gave to a point."""
-        there, name = self.at(held.row, held.scope), spell_element(held, self.brackets)
+        there, name = self.at(held.scope), spell_element(held, self.brackets)
         goal = self.unknown(AT_RUN_TIME)
         if held.operand is not None:
             goal = there.goal(held.operand)
         why = []
         for place in held.chain:
-            where = self.at(self.row, Scope(*place[:3]))
+            where = self.at(Scope(*place[:3], row=self.here.row))
             why.append(where.explain_pinned(place[-1], goal.file))
         why += self.explain_kept(held)
         pins = next(filter(None, (goal.pins, *why)), "")
@@ -252,7 +251,10 @@ class GoalReader(ABC):
         shift = goal.shift
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
-        return replace(goal, name=name, pins=pins, shift=shift)
+        doubtful = goal.doubtful
+        if goal.target == Meaning.UNKNOWN and held.operand is not None:
+            doubtful |= self.task.names_of(held.operand)
+        return replace(goal, name=name, pins=pins, shift=shift, doubtful=doubtful)
 
     def _set_components(
         self, held: AssignedPoint, base: FoundGoal, name: str, pins: str

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, Self, TypeVar
 
 from postproc.language import ir
-from postproc.language.analysis.call_context import CALLED, Context, Point
+from postproc.language.analysis.call_context import CALLED, At, Context, Point
 from postproc.language.analysis.control_flow import EXIT, ControlFlow
 
 MOST_ROUNDS = 10_000  # rounds of loops within each other, followed one by one
@@ -100,27 +100,25 @@ class Interpreter(ABC, Generic[S]):
     """
 
     root: Context = field(default_factory=Context)
-    entries: dict[tuple[Context, int], S] = field(default_factory=dict)
-    counted: dict[tuple[Context, int], Counting] = field(default_factory=dict)
-    widened: set[tuple[Context, int]] = field(default_factory=set)
+    entries: dict[At, S] = field(default_factory=dict)
+    counted: dict[At, Counting] = field(default_factory=dict)
+    widened: set[At] = field(default_factory=set)
     unrolled: int = 0
     steps: int = 0
     exhausted: bool = False
     _heap: list[tuple[Point, int]] = field(default_factory=list)
-    _queued: set[tuple[Context, int]] = field(default_factory=set)
+    _queued: set[At] = field(default_factory=set)
 
     # What a language says.
 
     @abstractmethod
-    def act(
-        self, context: Context, row: int, one: ir.SourceStatement, state: S
-    ) -> S | None:
+    def act(self, at: At, one: ir.SourceStatement, state: S) -> S | None:
         """Carry out a statement that leads to the next one.
 
         None where it goes on in a routine, or where the language goes on by itself.
         """
 
-    def run_block(self, context: Context, row: int, state: S) -> tuple[int, S] | None:
+    def run_block(self, at: At, state: S) -> tuple[int, S] | None:
         """Run moves at once that differ only in where they go.
 
         Returns:
@@ -128,37 +126,30 @@ class Interpreter(ABC, Generic[S]):
         """
         return None
 
-    def before(
-        self, context: Context, row: int, one: ir.SourceStatement, state: S
-    ) -> S:
+    def before(self, at: At, one: ir.SourceStatement, state: S) -> S:
         """Allow for what a statement does besides leading elsewhere."""
         return state
 
     @abstractmethod
     def evaluate(
-        self, context: Context, row: int, operand: ir.Operand | None, state: S
+        self, at: At, operand: ir.Operand | None, state: S
     ) -> float | str | None:
         """Return what decides a way, None where only the run tells; truth is 0 or 1."""
 
-    def truth(
-        self, context: Context, row: int, condition: ir.Operand, state: S
-    ) -> bool | None:
+    def truth(self, at: At, condition: ir.Operand, state: S) -> bool | None:
         """Tell whether a condition holds, None where only the run tells."""
-        found = self.evaluate(context, row, condition, state)
+        found = self.evaluate(at, condition, state)
         return bool(found) if isinstance(found, float | bool) else None
 
-    def fits(
-        self, context: Context, row: int, case: ir.Branch, head: int, state: S
-    ) -> bool | None:
+    def fits(self, at: At, case: ir.Branch, head: At, state: S) -> bool | None:
         """Tell whether a case means what its block tests, None where it may."""
-        tested = self.selector(context.place.statement(head))
-        value = self.evaluate(context, head, tested, state)
+        value = self.evaluate(head, self.selector(head.statement), state)
         found: bool | None = not case.values and None
         for choice in case.values:
             low, high = choice, choice
             if isinstance(choice, ir.Interval):
                 low, high = choice.low, choice.high
-            a, b = (self.evaluate(context, row, one, state) for one in (low, high))
+            a, b = (self.evaluate(at, one, state) for one in (low, high))
             known = type(a) is type(b) is type(value) and isinstance(value, float | str)
             if not known:
                 found = None
@@ -171,19 +162,15 @@ class Interpreter(ABC, Generic[S]):
         return head.values[0] if isinstance(head, ir.Branch) and head.values else None
 
     def loop_limit(
-        self, context: Context, row: int, operand: ir.Operand | None, state: S
+        self, at: At, operand: ir.Operand | None, state: S
     ) -> float | str | None:
         """Return a bound of a loop, None where it is not known."""
-        return self.evaluate(context, row, operand, state)
+        return self.evaluate(at, operand, state)
 
-    def count(
-        self, context: Context, row: int, loop: ir.ForLoop, state: S
-    ) -> Counting | None:
+    def count(self, at: At, loop: ir.ForLoop, state: S) -> Counting | None:
         """Return the rounds of a loop, None where they are not known."""
-        first, last, step = (
-            self.loop_limit(context, row, one, state)
-            for one in (loop.first, loop.last, loop.step)
-        )
+        bounds = loop.first, loop.last, loop.step
+        first, last, step = (self.loop_limit(at, one, state) for one in bounds)
         if not (isinstance(first, float) and isinstance(last, float)):
             return None
         if loop.step is None:
@@ -197,22 +184,20 @@ class Interpreter(ABC, Generic[S]):
         """Return what a loop counts by where it does not say so."""
         return 1.0
 
-    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+    def counts_alone(self, at: At, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
         return True
 
-    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+    def say_not_unrolled(self, at: At, rounds: int) -> None:
         """Say that a loop runs too often to be followed round by round."""
 
     @abstractmethod
     def begin_round(
-        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: S
+        self, at: At, loop: ir.ForLoop, value: float, state: S
     ) -> tuple[Any, S]:
         """Return where the statements of a round stand, and what holds as it begins."""
 
-    def forget_counter(
-        self, context: Context, row: int, loop: ir.ForLoop, ended: bool, state: S
-    ) -> S:
+    def forget_counter(self, at: At, loop: ir.ForLoop, ended: bool, state: S) -> S:
         """Forget what a loop counts, behind it or where it is not known."""
         return state
 
@@ -220,24 +205,19 @@ class Interpreter(ABC, Generic[S]):
     def leave(self, context: Context, state: S, by_return: bool = False) -> None:
         """Go on where a routine ends."""
 
-    def leave_otherwise(
-        self, context: Context, row: int, one: ir.Leave, state: S
-    ) -> S | None:
+    def leave_otherwise(self, at: At, one: ir.Leave, state: S) -> S | None:
         """Go on behind another word than RETURN that leads elsewhere; often nowhere."""
         return None
 
-    def lose_way(
-        self, context: Context, row: int, one: ir.SourceStatement, state: S
-    ) -> S:
+    def lose_way(self, at: At, one: ir.SourceStatement, state: S) -> S:
         """Go on behind a statement that leads to no place that is known."""
         return state
 
     # Configurations.
 
-    def enter(self, context: Context, row: int, state: S) -> None:
+    def enter(self, at: At, state: S) -> None:
         """Come to a row, once more or for the first time."""
-        context = _rounds_of(context, row)
-        config = context, row
+        config = At(_rounds_of(at), at.row)
         known = self.entries.get(config)
         joined = state.copy() if known is None else known.join(state)
         if joined is known:
@@ -245,232 +225,216 @@ class Interpreter(ABC, Generic[S]):
         self.entries[config] = joined
         if config not in self._queued:
             self._queued.add(config)
-            at = context.place.offset + row
-            heapq.heappush(self._heap, (Point(context, at), row))
+            heapq.heappush(self._heap, (Point(config.context, config.job_row), at.row))
 
-    def go_on(self, context: Context, row: int, state: S) -> None:
+    def go_on(self, at: At, state: S) -> None:
         """Go on with a row as the one after the last: ELSE and CASE end a branch."""
-        place = context.place
-        if row < place.flow.last and ir.divides(place.statement(row)):
-            row = place.flow.end.get(row, row)
-        self.enter(context, row, state)
+        flow = at.place.flow
+        if at.row < flow.last and ir.divides(at.statement):
+            at = at.to(flow.end.get(at.row, at.row))
+        self.enter(at, state)
 
     def follow(self) -> None:
         """Follow all ways from the rows that have been entered."""
         while self._heap and not self.exhausted:
             point, row = heapq.heappop(self._heap)
-            config = point.context, row
+            config = At(point.context, row)
             self._queued.discard(config)
-            self._run(point.context, row, self.entries[config].copy())
+            self._run(config, self.entries[config].copy())
 
-    def _run(self, context: Context, row: int, state: S) -> None:
+    def _run(self, begin: At, state: S) -> None:
         """Run statements one after the other until ways part or meet."""
-        place, start = context.place, row
-        flow = place.flow
-        while row < flow.last:
-            if row != start and row in flow.joins:
-                self.go_on(context, row, state)
+        at, flow = begin, begin.place.flow
+        while at.row < flow.last:
+            if at is not begin and at.row in flow.joins:
+                self.go_on(at, state)
                 return
             self.steps += 1
             self.exhausted |= self.steps > MOST_STEPS
-            if (block := self.run_block(context, row, state)) is not None:
+            if (block := self.run_block(at, state)) is not None:
                 row, state = block
+                at = at.to(row)
                 continue
-            one = place.statement(row)
+            one = at.statement
             if ir.divides(one):
-                if row != start:
-                    self.go_on(context, row, state)
+                if at is not begin:
+                    self.go_on(at, state)
                     return
                 one = getattr(one, "then", None) or ir.SourceStatement()
-            after = self.run_one(context, row, one, state)
+            after = self.run_one(at, one, state)
             if after is None:
                 return
-            row, state = row + 1, after
-        self.leave(context, state)
+            at, state = at.behind, after
+        self.leave(begin.context, state)
 
-    def run_one(
-        self, context: Context, row: int, one: ir.SourceStatement, state: S
-    ) -> S | None:
+    def run_one(self, at: At, one: ir.SourceStatement, state: S) -> S | None:
         """Run a statement; None where the next row does not follow."""
         while isinstance(one, ir.LabelMark) and one.then is not None:
             one = one.then
         if isinstance(one, _CONTROL):
-            state = self.before(context, row, one, state)
-            return self._part(context, row, one, state)
-        return self.act(context, row, one, state)
+            return self._part(at, one, self.before(at, one, state))
+        return self.act(at, one, state)
 
     # Where ways part.
 
-    def _part(
-        self, context: Context, row: int, one: ir.SourceStatement, state: S
-    ) -> S | None:
+    def _part(self, at: At, one: ir.SourceStatement, state: S) -> S | None:
         """Go all ways that a statement may lead; return the state where one goes on."""
-        flow = context.place.flow
+        row, flow = at.row, at.place.flow
         match one:
             case ir.Branch(word="if" | "while" | "until"):
-                self._decide(context, row, one, state)
+                self._decide(at, one, state)
             case ir.Branch(word="test"):
-                self._otherwise(context, row, state)
+                self._otherwise(at, state)
             case ir.BlockWord(word="endwhile" | "endloop") if row in flow.head:
-                self.enter(context, flow.head[row], state)
+                self.enter(at.to(flow.head[row]), state)
             case ir.Branch(word="condition"):
-                self.go_on(context, flow.behind(row), state)
+                self.go_on(at.to(flow.behind(row)), state)
             case ir.BlockWord(word="endcondition"):
                 pass
             case ir.ForLoop():
-                self._begin_loop(context, row, one, state)
+                self._begin_loop(at, one, state)
             case ir.BlockWord(word="endfor") if row in flow.head:
-                self._end_round(context, row, state)
+                self._end_round(at, state)
             case ir.JumpTo(name=name):
-                return self._jump(context, row, flow.labels.get(name), one, state)
+                return self._jump(at, flow.labels.get(name), one, state)
             case ir.Leave(word=word) if word == EXIT:
                 to = flow.behind(flow.exits[row]) if row in flow.exits else None
-                return self._jump(context, row, to, one, state)
+                return self._jump(at, to, one, state)
             case ir.Leave(word="return"):
-                self.leave(context, state, by_return=True)
+                self.leave(at.context, state, by_return=True)
             case ir.Leave():
-                return self.leave_otherwise(context, row, one, state)
+                return self.leave_otherwise(at, one, state)
             case _:
                 return state
         return None
 
-    def _decide(self, context: Context, row: int, one: ir.Branch, state: S) -> None:
+    def _decide(self, at: At, one: ir.Branch, state: S) -> None:
         """Go both ways behind a condition, or the one that is known."""
-        flow = context.place.flow
+        flow = at.place.flow
         truth = None
         if one.values:
-            truth = self.truth(context, row, one.values[0], state)
+            truth = self.truth(at, one.values[0], state)
         if truth is not False:
-            self.go_on(context, row + 1, state)
+            self.go_on(at.behind, state)
         if truth is not True and one.word == "if":
-            self._otherwise(context, row, state)
+            self._otherwise(at, state)
         elif truth is not True and one.word == "while":
-            self.go_on(context, flow.behind(row), state)
+            self.go_on(at.to(flow.behind(at.row)), state)
         elif truth is not True:
-            self.enter(context, flow.head.get(row, row), state)
+            self.enter(at.to(flow.head.get(at.row, at.row)), state)
 
-    def _otherwise(self, context: Context, row: int, state: S) -> None:
+    def _otherwise(self, head: At, state: S) -> None:
         """Go to the divisions of a block that may be meant, or to its end."""
-        place, flow = context.place, context.place.flow
-        for at in flow.divisions_behind(row):
-            one = place.statement(at)
-            state = self.before(context, at, one, state)
+        flow = head.place.flow
+        for at in map(head.to, flow.divisions_behind(head.row)):
+            one = at.statement
+            state = self.before(at, one, state)
             fits: bool | None = True
             if isinstance(one, ir.Branch) and one.word == "elseif":
-                fits = self.truth(context, at, one.values[0], state)
+                fits = self.truth(at, one.values[0], state)
             elif isinstance(one, ir.Branch) and one.word != "default":
-                fits = self.fits(context, at, one, row, state)
+                fits = self.fits(at, one, head, state)
             if fits is not False:
-                self.enter(context, at, state)
+                self.enter(at, state)
             if fits is True:
                 return
-        self.enter(context, flow.end.get(row, flow.last), state)
+        self.enter(head.to(flow.end.get(head.row, flow.last)), state)
 
     def _jump(
-        self, context: Context, row: int, to: int | None, one: ir.SourceStatement,
-        state: S,
-    ) -> S | None:  # fmt: skip
+        self, at: At, to: int | None, one: ir.SourceStatement, state: S
+    ) -> S | None:
         """Go to a label, or out of a loop."""
         if to is None:
-            return self.lose_way(context, row, one, state)
-        self.go_on(context, to, state)
+            return self.lose_way(at, one, state)
+        self.go_on(at.to(to), state)
         return None
 
     # Loops that count: round by round where the bounds are known, else over and over.
 
-    def _begin_loop(
-        self, context: Context, row: int, loop: ir.ForLoop, state: S
-    ) -> None:
+    def _begin_loop(self, at: At, loop: ir.ForLoop, state: S) -> None:
         """Go into the first round, past the loop, or both where that is not known."""
-        config, behind = (context, row), context.place.flow.behind(row)
-        counting = self.count(context, row, loop, state)
+        behind = at.to(at.place.flow.behind(at.row))
+        counting = self.count(at, loop, state)
         if counting is not None and not counting.rounds:
-            self.go_on(context, behind, state)
+            self.go_on(behind, state)
             return
-        if counting is not None and self._unroll(context, row, loop, counting):
-            self._round(context, row, loop, 0, state)
+        if counting is not None and self._unroll(at, loop, counting):
+            self._round(at, loop, 0, state)
             return
-        self.widened.add(config)
-        state = self.forget_counter(context, row, loop, False, state)
+        self.widened.add(at)
+        state = self.forget_counter(at, loop, False, state)
         if counting is None:
-            self.go_on(context, behind, state)
-        self.go_on(context, row + 1, state)
+            self.go_on(behind, state)
+        self.go_on(at.behind, state)
 
-    def _unroll(
-        self, context: Context, row: int, loop: ir.ForLoop, counting: Counting
-    ) -> bool:
+    def _unroll(self, at: At, loop: ir.ForLoop, counting: Counting) -> bool:
         """Tell whether a loop is followed round by round."""
-        config = context, row
-        if config in self.widened:
+        if at in self.widened:
             return False
-        if config not in self.counted:
-            if not self.counts_alone(context, row, loop):
+        if at not in self.counted:
+            if not self.counts_alone(at, loop):
                 return False
-            if not self._afford(context, row, counting.rounds):
-                self.say_not_unrolled(context, row, counting.rounds)
+            if not self._afford(at, counting.rounds):
+                self.say_not_unrolled(at, counting.rounds)
                 return False
-            self.counted[config] = counting
-        return self.counted[config] == counting
+            self.counted[at] = counting
+        return self.counted[at] == counting
 
-    def _afford(self, context: Context, row: int, rounds: int) -> bool:
+    def _afford(self, at: At, rounds: int) -> bool:
         """Tell whether there are so few rounds that each is followed by itself."""
-        rows = rounds * (context.place.flow.behind(row) - row)
-        if rounds * self.rounds_around(context) > MOST_ROUNDS:
+        rows = rounds * (at.place.flow.behind(at.row) - at.row)
+        if rounds * self.rounds_around(at.context) > MOST_ROUNDS:
             return False
         if self.unrolled + rows > MOST_ROWS:
             return False
         self.unrolled += rows
         return True
 
-    def _round(
-        self, outer: Context, row: int, loop: ir.ForLoop, number: int, state: S
-    ) -> None:
+    def _round(self, at: At, loop: ir.ForLoop, number: int, state: S) -> None:
         """Start a round."""
-        at, value = outer.place.offset + row, self.counted[outer, row].value(number)
-        place, state = self.begin_round(outer, row, loop, value, state)
-        self.go_on(outer.within(at, number, place), row + 1, state)
+        value = self.counted[at].value(number)
+        place, state = self.begin_round(at, loop, value, state)
+        inner = at.context.within(at.job_row, number, place)
+        self.go_on(At(inner, at.row + 1), state)
 
-    def _end_round(self, context: Context, row: int, state: S) -> None:
+    def _end_round(self, at: At, state: S) -> None:
         """Go into the next round, out of the loop, or both where that is not known."""
-        place = context.place
-        head = place.flow.head[row]
-        loop = place.statement(head)
+        head = at.to(at.place.flow.head[at.row])
+        loop = head.statement
         loop = loop.then if isinstance(loop, ir.LabelMark) else loop
         assert isinstance(loop, ir.ForLoop)
-        if context.is_round and context.at == place.offset + head:
-            outer, number = context.outer, context.kind + 1
-            if number < self.counted[outer, head].rounds:
-                self._round(outer, head, loop, number, state)
+        if at.context.is_round and at.context.at == head.job_row:
+            outer, number = At(at.context.outer, head.row), at.context.kind + 1
+            if number < self.counted[outer].rounds:
+                self._round(outer, loop, number, state)
                 return
-            context = outer
+            at = At(outer.context, at.row)
         else:
-            state = self.forget_counter(context, row, loop, False, state)
-            self.go_on(context, head + 1, state)
-        state = self.forget_counter(context, row, loop, True, state)
-        self.go_on(context, row + 1, state)
+            state = self.forget_counter(at, loop, False, state)
+            self.go_on(head.behind, state)
+        state = self.forget_counter(at, loop, True, state)
+        self.go_on(at.behind, state)
 
     def rounds_around(self, context: Context) -> int:
         """Return how often a context is run by the loops around it and its callers."""
         times = 1
         for one in context.around():
             if one.is_round:
-                row = one.at - one.place.offset
-                times *= self.counted[one.outer, row].rounds
+                times *= self.counted[one.begun_at].rounds
         return times
 
     # Calls.
 
-    def call(self, context: Context, row: int, place: RoutinePlace, state: S) -> None:
+    def call(self, at: At, place: RoutinePlace, state: S) -> None:
         """Go into a routine; it comes back to the row behind this one."""
-        inner = context.within(context.place.offset + row, CALLED, place)
-        self.enter(inner, place.flow.first, state)
+        inner = at.context.within(at.job_row, CALLED, place)
+        self.enter(At(inner, place.flow.first), state)
 
     def return_to_caller(self, context: Context, state: S) -> None:
         """Go back to where a routine was called."""
         call = context.call
         if call.kind == CALLED and call.outer.place is not None:
-            row = call.at - call.outer.place.offset
-            self.go_on(call.outer, row + 1, state)
+            self.go_on(call.begun_at.behind, state)
 
 
 def calls_around(context: Context) -> Iterator[Context]:
@@ -478,11 +442,12 @@ def calls_around(context: Context) -> Iterator[Context]:
     return (one for one in context.around() if not one.is_round)
 
 
-def _rounds_of(context: Context, row: int) -> Context:
+def _rounds_of(at: At) -> Context:
     """Drop the rounds of loops that a jump to a row leaves."""
+    context = at.context
     while context.is_round:
-        head = context.at - context.place.offset
-        if head < row <= context.place.flow.end[head]:
+        head = context.begun_at.row
+        if head < at.row <= context.place.flow.end[head]:
             break
         context = context.outer
     return context

@@ -23,7 +23,6 @@ from postproc.language.analysis.assigned_points import (
     Scope,
     source_of,
 )
-from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
 from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
 from postproc.language.analysis.uses import NamesUsed, match_arguments
@@ -43,8 +42,6 @@ from postproc.language.analysis.values import (
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
-Given = tuple[ir.Operand, int, Scope]
-"""An operand, its row and where that stands."""
 F = TypeVar("F", bound=TaskFile)
 
 
@@ -154,13 +151,11 @@ class TaskSymbols(ABC, Generic[F]):
         """Return the file that stands for all that a file shares its names with."""
         return file
 
-    def apply(
-        self, call: ir.FunctionCall, row: int, here: Scope, depth: int
-    ) -> Value | None:
+    def apply(self, call: ir.FunctionCall, here: Scope, depth: int) -> Value | None:
         """Return what a function of the controller gives, None where not known."""
         if call.name not in ALIKE or len(call.arguments) != 1:
             return None
-        number = self.number(call.arguments[0].value, row, here)
+        number = self.number(call.arguments[0].value, here)
         return _make_number(apply_function(call.name, number))
 
     def operate(self, operator: str, parts: Sequence[Value | None]) -> Value | None:
@@ -171,9 +166,7 @@ class TaskSymbols(ABC, Generic[F]):
             apply_operator(operator, [number_in(part) for part in parts])
         )
 
-    def build(
-        self, operand: ir.Operand, row: int, here: Scope, depth: int
-    ) -> Value | None:
+    def build(self, operand: ir.Operand, here: Scope, depth: int) -> Value | None:
         """Evaluate a value that only this language has, None where it is not known."""
         return None
 
@@ -224,18 +217,19 @@ class TaskSymbols(ABC, Generic[F]):
         around = (one for one in self.routines_by_file[file] if row in one.inside)
         return next(around, None)
 
-    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
+    def scope_of(self, routine: TaskRoutine) -> Scope:
         """Return where the statements of a routine stand."""
-        place = self.unit(file), module, routine.head.name
+        (file, module, _), head = routine, routine.rows.head
+        place = self.unit(file), module, head.name
         named = frozenset(
-            one.name for one in routine.head.parameters
+            one.name for one in head.parameters
             if one.by_reference or (*place, one.name) not in self._own
         )  # fmt: skip
-        return Scope(file, module, routine.head.name, named)
+        return Scope(file, module, head.name, named)
 
     def scope_of_datum(self, file: int, datum: Datum) -> Scope:
         """Return where data are declared."""
-        return Scope(file, datum.module, datum.routine)
+        return Scope(file, datum.module, datum.routine, row=datum.row)
 
     def place(self, name: str, here: Scope) -> Place | None:
         """Find where the data are declared that a name means, None if not known."""
@@ -362,9 +356,8 @@ class TaskSymbols(ABC, Generic[F]):
     # What routines are called with.
 
     def bind(
-        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, row: int,
-        there: Scope,
-    ) -> Scope | None:  # fmt: skip
+        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, there: Scope
+    ) -> Scope | None:
         """Return where the statements of a routine stand, and what it is called with.
 
         That are parameters that stand for other data, and those that hold what never
@@ -373,7 +366,6 @@ class TaskSymbols(ABC, Generic[F]):
         Args:
             routine: The routine.
             call: The call.
-            row: Its row.
             there: Where it stands.
 
         Returns:
@@ -383,12 +375,12 @@ class TaskSymbols(ABC, Generic[F]):
         if pairs is None:
             return None
         given = tuple(
-            (parameter.name, argument.value, row, there)
+            (parameter.name, argument.value, there)
             for parameter, argument in pairs
             if argument.value is not None
             and (parameter.by_reference or self._is_fixed(parameter, argument.value))
         )
-        return replace(self.scope_of(*routine), given=given)
+        return replace(self.scope_of(routine), given=given)
 
     def _is_fixed(self, parameter: ir.RoutineParameter, value: ir.Operand) -> bool:
         """Return True if a parameter is a copy of what never changes, nor does it."""
@@ -397,7 +389,7 @@ class TaskSymbols(ABC, Generic[F]):
 
     def hand_over(
         self, points: Points, routine: TaskRoutine,
-        call: ir.Instruction | ir.FunctionCall, row: int, there: Scope,
+        call: ir.Instruction | ir.FunctionCall, there: Scope,
     ) -> Points:  # fmt: skip
         """Return what points hold where a routine begins that gets copies.
 
@@ -405,44 +397,43 @@ class TaskSymbols(ABC, Generic[F]):
             points: What they hold there without them.
             routine: The routine.
             call: The call.
-            row: Its row.
             there: Where it stands.
         """
         pairs = match_arguments(routine.rows.head.parameters, call.arguments) or ()
-        here = self.scope_of(*routine)
+        here = self.scope_of(routine).at(routine.rows.first)
         for parameter, argument in pairs:
             if parameter.by_reference or argument.value is None:
                 continue
-            part = self.locate(ir.DataObject(parameter.name), routine.rows.first, here)
+            part = self.locate(ir.DataObject(parameter.name), here)
             if part is None or part.index is None or argument.passed_on:
                 continue
             if not self._is_fixed(parameter, argument.value):
                 watched = replace(there, points=there.points.watch())
-                given = self._give_value(part, (), argument.value, row, watched)
+                given = self._give_value(part, (), argument.value, watched)
                 points = points.give(given)
         return points
 
     def behind(
-        self, operand: ir.Operand | None, row: int, here: Scope
-    ) -> tuple[ir.Operand | None, int, Scope]:
+        self, operand: ir.Operand | None, here: Scope
+    ) -> tuple[ir.Operand | None, Scope]:
         """Return what stands behind a parameter or a call of a function, and its place.
 
         That is the operand itself where it is neither, or not known.
         """
         for _ in range(DEEPEST):
-            for _, given, at, there in self.find_given(operand, here):
-                operand, row, here = given, at, there
+            for _, given, there in self.find_given(operand, here):
+                operand, here = given, there
             if not isinstance(operand, ir.FunctionCall):
                 break
-            returned = self.find_returned(operand, row, here)
+            returned = self.find_returned(operand, here)
             if returned is None:
                 break
-            operand, row, here = returned
-        return operand, row, here
+            operand, here = returned
+        return operand, here
 
     def find_given(
         self, operand: ir.Operand | None, here: Scope
-    ) -> Iterator[tuple[str, ir.Operand, int, Scope]]:
+    ) -> Iterator[tuple[str, ir.Operand, Scope]]:
         """Yield the parameters that an operand stands for, as in `Scope.given`."""
         while isinstance(operand, ir.DataObject) and not operand.steps:
             if operand.name in dict(here.loops):
@@ -451,45 +442,43 @@ class TaskSymbols(ABC, Generic[F]):
             given = next(found, None)
             if given is None:
                 return
-            name, operand, row, there = given
+            name, operand, there = given
             here = replace(there, points=here.points)
-            yield name, operand, row, here
+            yield name, operand, here
 
     # Values.
 
-    def number(self, operand: ir.Operand | None, row: int, here: Scope) -> float:
+    def number(self, operand: ir.Operand | None, here: Scope) -> float:
         """Evaluate a number, NaN where it is not known before the program runs."""
-        return number_in(self.value(operand, row, here))
+        return number_in(self.value(operand, here))
 
-    def decide(
-        self, operand: ir.Operand | None, row: int, here: Scope
-    ) -> float | str | None:
+    def decide(self, operand: ir.Operand | None, here: Scope) -> float | str | None:
         """Evaluate what decides a way, None where more than the program decides it.
 
         It is written as a number, or the program has given its data values on the way.
         """
         if isinstance(operand, ir.Operation) and operand.operator in ("AND", "OR"):
-            parts = [self.decide(one, row, here) for one in operand.operands]
+            parts = [self.decide(one, here) for one in operand.operands]
             numbers = [one if isinstance(one, float) else math.nan for one in parts]
             truth = apply_operator(operand.operator, numbers)
             return None if math.isnan(truth) else truth
         names = frozenset() if operand is None else self.names_of(operand)
-        given = [self._is_given(name, row, here) for name in names]
+        given = [self._is_given(name, here) for name in names]
         if names and (None in given or not any(given)):
             return None
-        found = self.value(operand, row, here)
+        found = self.value(operand, here)
         if isinstance(found, WrittenNumber):
             return found.value
         return found if isinstance(found, str) else None
 
-    def _is_given(self, name: str, row: int, here: Scope) -> bool | None:
+    def _is_given(self, name: str, here: Scope) -> bool | None:
         """Tell whether a program gives data a value on the way; None: more than it."""
         if name in dict(here.loops):
             return True
-        if self.find_held(ir.DataObject(name), row, here) is not None:
+        if self.find_held(ir.DataObject(name), here) is not None:
             return True
-        for _, operand, at, there in self.find_given(ir.DataObject(name), here):
-            inner = [self._is_given(one, at, there) for one in self.names_of(operand)]
+        for _, operand, there in self.find_given(ir.DataObject(name), here):
+            inner = [self._is_given(one, there) for one in self.names_of(operand)]
             return None if None in inner else True
         if name in self.routines:
             return True if self._is_closed(name, here) else None
@@ -505,14 +494,14 @@ class TaskSymbols(ABC, Generic[F]):
         found = self.routine(name, here)
         if found is None:
             return False
-        scope, text = self.scope_of(*found), self.files[found.file].text
+        scope, text = self.scope_of(found), self.files[found.file].text
         said = [text.statement(row) for row in found.inside]
         parts = [one for one in ir.walk(*said) if isinstance(one, ir.DataObject)]
         places = (self.place(one.name, scope) for one in parts)
         return all(place is not None and place[2] for place in places)
 
     def value(
-        self, operand: ir.Operand | None, row: int, here: Scope, depth: int = 0
+        self, operand: ir.Operand | None, here: Scope, depth: int = 0
     ) -> Value | None:
         """Evaluate an operand, None where it is not known before the program runs."""
         if depth > DEEPEST:
@@ -520,62 +509,62 @@ class TaskSymbols(ABC, Generic[F]):
         match operand:
             case ir.Num(slot=slot):
                 text = self.files[here.file].text
-                at = int(text.first[row]) + slot
+                at = int(text.first[here.row]) + slot
                 return _make_number(float(text.value[at]), here.file, at)
             case ir.StringLiteral(text=written):
                 return written
             case ir.Composite(items=items):
-                parts = [self.value(one, row, here, depth) for one in items]
+                parts = [self.value(one, here, depth) for one in items]
                 known = tuple(part for part in parts if part is not None)
                 return known if len(known) == len(parts) else None
             case ir.Operation(operator=operator, operands=operands):
-                parts = [self.value(one, row, here, depth) for one in operands]
+                parts = [self.value(one, here, depth) for one in operands]
                 return self.operate(operator, parts)
             case ir.DataObject():
-                return self._evaluate_data(operand, row, here, depth)
+                return self._evaluate_data(operand, here, depth)
             case ir.FunctionCall(name=name):
-                returned = self.find_returned(operand, row, here)
+                returned = self.find_returned(operand, here)
                 if returned is not None:
                     return self.value(*returned, depth + 1)
                 own = name in self.routines
-                return None if own else self.apply(operand, row, here, depth)
+                return None if own else self.apply(operand, here, depth)
             case None:
                 return None
             case _:
-                return self.build(operand, row, here, depth)
+                return self.build(operand, here, depth)
 
     def _evaluate_data(
-        self, data: ir.DataObject, row: int, here: Scope, depth: int
+        self, data: ir.DataObject, here: Scope, depth: int
     ) -> Value | None:
         """Evaluate data by name, and what the steps behind it lead to."""
         name, steps, loops = data.name, data.steps, dict(here.loops)
         if name in loops:
             return None if steps else WrittenNumber(loops[name])
-        value, steps, type_ = self._evaluate_named(data, row, here, depth + 1)
+        value, steps, type_ = self._evaluate_named(data, here, depth + 1)
         layout = self.layouts.get(type_, {})
         for step in steps:
-            into = step if isinstance(step, str) else self.index(step, row, here)
+            into = step if isinstance(step, str) else self.index(step, here)
             value, layout = step_into(value, into, layout)
         return value
 
     def _evaluate_named(
-        self, data: ir.DataObject, row: int, here: Scope, depth: int
+        self, data: ir.DataObject, here: Scope, depth: int
     ) -> tuple[Value | None, tuple[str | ir.ElementStep, ...], str]:
         """Return what data, or an element, hold; then further steps, and their type."""
         name, steps = data.name, data.steps
         count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
         whole = replace(data, steps=steps[:count]) if steps[count:] else data
-        held = self.find_held(whole, row, here)
+        held = self.find_held(whole, here)
         if held is not None:
             value = self.evaluate_held(held, depth)
             return value, steps[count:], self.type_of(held.place)
-        for _, operand, at, there in self.find_given(ir.DataObject(name), here):
-            return self.value(operand, at, there, depth + 1), steps, ""
+        for _, operand, there in self.find_given(ir.DataObject(name), here):
+            return self.value(operand, there, depth + 1), steps, ""
         if not steps and self.place(name, here) is None and name in self.constants:
             return WrittenNumber(self.constants[name]), steps, ""
         found = None
         if self.apart and steps and isinstance(steps[0], ir.ElementStep):
-            index = self.index(steps[0], row, here)
+            index = self.index(steps[0], here)
             found = index and self.constant(name, here, index)
             steps = steps[1:]
         else:
@@ -584,15 +573,13 @@ class TaskSymbols(ABC, Generic[F]):
             return None, (), ""
         file, datum = found
         there = self.scope_of_datum(file, datum)
-        return self.value(datum.value, datum.row, there, depth), steps, datum.type
+        return self.value(datum.value, there, depth), steps, datum.type
 
-    def index(
-        self, step: ir.ElementStep | str, row: int, here: Scope
-    ) -> tuple[int, ...] | None:
+    def index(self, step: ir.ElementStep | str, here: Scope) -> tuple[int, ...] | None:
         """Return the index of an element from 1, None where it is not known."""
         if isinstance(step, str):
             return None
-        values = [whole(self.number(one, row, here)) for one in step.subscripts]
+        values = [whole(self.number(one, here)) for one in step.subscripts]
         known = tuple(k for k in values if k is not None)
         return known if len(known) == len(values) and known else None
 
@@ -602,10 +589,10 @@ class TaskSymbols(ABC, Generic[F]):
         """Return the type of data by their place."""
         return self._own[place][()][1].type
 
-    def locate(self, data: ir.DataObject, row: int, here: Scope) -> PointPart | None:
+    def locate(self, data: ir.DataObject, here: Scope) -> PointPart | None:
         """Find the point that only assignments change, None for all other data."""
         name, there = data.name, here
-        for _, operand, _, outer in self.find_given(ir.DataObject(name), here):
+        for _, operand, outer in self.find_given(ir.DataObject(name), here):
             if not isinstance(operand, ir.DataObject) or operand.steps:
                 return None
             name, there = operand.name, outer
@@ -619,7 +606,7 @@ class TaskSymbols(ABC, Generic[F]):
         steps = data.steps
         index: tuple[int, ...] | None = ()
         if datum.dimensions:
-            index = self._find_element(file, datum, steps[:1], row, here)
+            index = self._find_element(file, datum, steps[:1], here)
             steps = steps[1:]
         component = ".".join(step for step in steps if isinstance(step, str))
         known = all(isinstance(step, str) for step in steps)
@@ -628,29 +615,28 @@ class TaskSymbols(ABC, Generic[F]):
 
     def _find_element(
         self, file: int, datum: Datum, steps: Sequence[str | ir.ElementStep],
-        row: int, here: Scope,
+        here: Scope,
     ) -> tuple[int, ...] | None:  # fmt: skip
         """Return the index of an element, None where it is not known, or no element."""
         there = self.scope_of_datum(file, datum)
-        sizes = [self.number(one, datum.row, there) for one in datum.dimensions]
-        found = self.index(steps[0], row, here) if steps else None
+        sizes = [self.number(one, there) for one in datum.dimensions]
+        found = self.index(steps[0], here) if steps else None
         if found is None or len(found) != len(sizes):
             return None
         inside = all(1 <= at <= n for at, n in zip(found, sizes, strict=True))
         return found if inside else None
 
     def evaluate_components(
-        self, part: PointPart, value: ir.Operand, row: int, here: Scope
+        self, part: PointPart, value: ir.Operand, here: Scope
     ) -> Sequence[tuple[str, float | None]]:
         """Return the components that an assignment sets, and what it gives to them.
 
         Args:
             part: What is set.
             value: What it is given.
-            row: The assignment.
-            here: Where it stands.
+            here: The assignment.
         """
-        found, type_ = self.value(value, row, here), self.type_of(part.place)
+        found, type_ = self.value(value, here), self.type_of(part.place)
         names = self.spell(type_, part.component)
         if isinstance(found, KnownRecord):
             fitting = found.whole and not part.component and type_ in self.layouts
@@ -668,7 +654,7 @@ class TaskSymbols(ABC, Generic[F]):
         """Evaluate what assignments gave to data, None where it is not known."""
         type_, base = self.type_of(held.place), None
         if held.operand is not None:
-            base = self.value(held.operand, held.row, held.scope, depth)
+            base = self.value(held.operand, held.scope, depth)
         if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
             base = None
         if not held.components:
@@ -718,114 +704,111 @@ class TaskSymbols(ABC, Generic[F]):
         return not self.names_of(operand).isdisjoint(self.routines)
 
     def find_held(
-        self, operand: ir.Operand | None, row: int, here: Scope
+        self, operand: ir.Operand | None, here: Scope
     ) -> AssignedPoint | None:
         """Return what assignments gave to the point that an operand names."""
         if not (here.points.routines and isinstance(operand, ir.DataObject)):
             return None
-        part = self.locate(operand, row, here)
+        part = self.locate(operand, here)
         if part is None or part.index is None or part.component:
             return None
         return here.points.find((part.place, part.index))
 
-    def assign(
-        self, points: Points, one: ir.Assignment, row: int, here: Scope
-    ) -> Points:
+    def assign(self, points: Points, one: ir.Assignment, here: Scope) -> Points:
         """Return what points hold behind an assignment.
 
         Args:
             points: What they hold before it.
             one: The assignment.
-            row: Its row.
             here: Where it stands.
         """
-        part = self.locate(one.target, row, here)
+        part = self.locate(one.target, here)
         if part is None:
             return points
         if part.index is None:
             return points.forget(part.place)
         there = replace(here, points=points.watch())
-        return points.give(self._give_value(part, part.index, one.value, row, there))
+        return points.give(self._give_value(part, part.index, one.value, there))
 
     def _give_value(
-        self, part: PointPart, index: tuple[int, ...], value: ir.Operand, row: int,
-        here: Scope,
+        self, part: PointPart, index: tuple[int, ...], value: ir.Operand, here: Scope,
     ) -> AssignedPoint:  # fmt: skip
         """Return what a point holds that is given a value, or a component of it."""
         place, points, own = part.place, here.points, frozenset([part.place[-1]])
         plain = replace(here, points=NO_POINTS)
-        known = self.find_held(value, row, here)
+        known = self.find_held(value, here)
         if known is not None and not part.component:
             copied = (known.copied | {known.place}) - {place}
             return replace(
                 known, place=place, index=index, copied=copied, names=known.names | own
             )
         names = self.names_of(value)
-        if not (part.component or self._takes_held(value, row, here)):
-            return AssignedPoint(place, value, row, plain, index, names=own | names)
-        found = self.evaluate_components(part, value, row, here)
-        numbers = [Component(name, number, here.file, row) for name, number in found]
+        if not (part.component or self._takes_held(value, here)):
+            return AssignedPoint(place, value, plain, index, names=own | names)
+        found = self.evaluate_components(part, value, here)
+        numbers = [
+            Component(name, number, here.file, here.row) for name, number in found
+        ]
         names = names.union(own, *(point.names for point in points.given))
         if part.component:
             before = points.held.get((place, index))
-            point = before or AssignedPoint(place, None, row, plain, index)
+            point = before or AssignedPoint(place, None, plain, index)
             return point.with_components(numbers, names | own)
         if not points.given:  # what it is given never changes
-            return AssignedPoint(place, value, row, plain, index, names=names)
+            return AssignedPoint(place, value, plain, index, names=names)
         source = source_of(value)
-        base = self.find_held(source, row, here)
+        base = self.find_held(source, here)
         if base is None:
-            point = AssignedPoint(place, source, row, plain, index)
+            point = AssignedPoint(place, source, plain, index)
         else:
             copied = (base.copied | {base.place}) - {place}
             point = replace(base, place=place, index=index, copied=copied)
         return point.with_components(numbers, names)
 
     def find_returned(
-        self, call: ir.FunctionCall, row: int, here: Scope
-    ) -> tuple[ir.Operand, int, Scope] | None:
-        """Return what a function returns, its row and where that stands.
+        self, call: ir.FunctionCall, here: Scope
+    ) -> tuple[ir.Operand, Scope] | None:
+        """Return what a function returns, and where that stands.
 
         None for functions that do more than to set points of their own, or call others.
 
         Args:
             call: The call.
-            row: Its row.
             here: Where it stands.
         """
         found = self.routine(call.name, here)
         if found is None or found.rows.head.kind != self.functions:
             return None
-        scope = self.bind(found, call, row, here)
+        scope = self.bind(found, call, here)
         if scope is None:
             return None
-        points = self.hand_over(here.points, found, call, row, here)
+        points = self.hand_over(here.points, found, call, here)
         own = self.unit(scope.file), scope.module, scope.routine
         for at in found.inside:
             one = self.files[found.file].text.statement(at)
             if isinstance(one, ir.Declaration):
                 continue
-            scope = replace(scope, points=points)
+            scope = replace(scope, points=points, row=at)
             if not isinstance(one, ir.Assignment | ir.Leave) or one.value is None:
                 return None
             if self.calls_routine(one.value):
                 return None
             if isinstance(one, ir.Leave):
-                return (one.value, at, scope) if one.word == "return" else None
-            part = self.locate(one.target, at, scope)
+                return (one.value, scope) if one.word == "return" else None
+            part = self.locate(one.target, scope)
             if part is None or part.place[:3] != own:
                 return None
-            points = self.assign(points, one, at, scope)
+            points = self.assign(points, one, scope)
         return None
 
-    def _takes_held(self, value: ir.Operand, row: int, here: Scope) -> bool:
+    def _takes_held(self, value: ir.Operand, here: Scope) -> bool:
         """Return True if a value may be made from what assigned points hold."""
         if not here.points.routines:
             return False
         if self.calls_routine(value):
             return True
         parts = (
-            self.locate(ir.DataObject(name), row, here) for name in self.names_of(value)
+            self.locate(ir.DataObject(name), here) for name in self.names_of(value)
         )
         return any(part and part.place in here.points for part in parts)
 

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import defaultdict
-from collections.abc import (
-    Callable,
-    Collection,
-    Iterable,
-    Iterator,
-    Mapping,
-    Sequence,
-)
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -22,12 +15,8 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.diagnostics import Code
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
-    Points,
-    Scope,
-)
-from postproc.language.analysis.call_context import CALLED, Context
+from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
+from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import (
     ControlFlow,
@@ -161,7 +150,7 @@ class TaskMachine(Interpreter[Arrived]):
     lost: set[int] = field(default_factory=set)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _runs_in: dict[Context, Runs] = field(default_factory=dict)
-    _numbers: dict[tuple[Context, int], list[int]] = field(default_factory=dict)
+    _numbers: dict[At, list[int]] = field(default_factory=dict)
     _read: dict[tuple[int, int], tuple[Effects, list[TaskRoutine]]] = field(
         default_factory=dict
     )
@@ -179,14 +168,12 @@ class TaskMachine(Interpreter[Arrived]):
         """Follow every way from where the task begins."""
 
     @abstractmethod
-    def carry_out(
-        self, context: Context, row: int, one: Any, here: Arrived
-    ) -> Arrived | None:
+    def carry_out(self, at: At, one: Any, here: Arrived) -> Arrived | None:
         """Carry an acting statement out; None where it goes on in a routine."""
 
     @abstractmethod
     def after_functions(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do."""
 
@@ -204,13 +191,12 @@ class TaskMachine(Interpreter[Arrived]):
 
     @abstractmethod
     def read_visits(
-        self, one: Any, row: int, scope: Scope, here: Arrived | None
+        self, one: Any, scope: Scope, here: Arrived | None
     ) -> Iterable[Any]:
         """Read the visits of a move, nothing for all else.
 
         Args:
             one: The statement.
-            row: Its row.
             scope: Where it stands.
             here: How the arm comes to it, None where that does not count.
         """
@@ -236,22 +222,22 @@ class TaskMachine(Interpreter[Arrived]):
         return one
 
     def part_otherwise(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Go on behind a statement that only this language has."""
-        after = self.unknown(context, row, here)
+        after = self.unknown(at, here)
         if ir.is_odd(one):
-            self.may_jump(context, row, after)
+            self.may_jump(at, after)
         return after
 
-    def may_jump(self, context: Context, row: int, here: Arrived) -> None:
+    def may_jump(self, at: At, here: Arrived) -> None:
         """Go wherever a statement that is not understood may lead, by its words."""
-        if JUMPS.isdisjoint(self.texts[context.place.scope.file].words([row])):
+        if JUMPS.isdisjoint(at.place.text.words([at.row])):
             return
-        flow = context.place.flow
+        flow = at.place.flow
         for to in sorted(flow.joins | {end + 1 for end in flow.head}):
-            self.go_on(context, to, here)
-        self.leave(context, here)
+            self.go_on(at.to(to), here)
+        self.leave(at.context, here)
 
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether the handlers of a routine begin with a statement."""
@@ -264,14 +250,14 @@ class TaskMachine(Interpreter[Arrived]):
     def _scopes_of(
         self, routine: TaskRoutine, seen: frozenset[tuple[int, int]]
     ) -> Iterator[Scope]:
-        yield self.task.scope_of(*routine)
+        yield self.task.scope_of(routine)
         head = routine.rows.head
         if not head.parameters or routine.key in seen:
             return
         seen = seen | {routine.key}
         for caller, row, call in self._calls_by_name[head.name]:
             for there in self._scopes_of(caller, seen):
-                bound = self.task.bind(routine, call, row, there)
+                bound = self.task.bind(routine, call, there.at(row))
                 if bound is not None:
                     yield bound
 
@@ -306,76 +292,62 @@ class TaskMachine(Interpreter[Arrived]):
 
     # From statement to statement, see `Interpreter`.
 
-    def act(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
-    ) -> Arrived | None:
+    def act(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived | None:
         """Carry out a statement that leads to the next one."""
         if isinstance(one, self.acting):
-            return self.carry_out(context, row, one, state)
-        state = self.after_functions(context, row, one, state)
+            return self.carry_out(at, one, state)
+        state = self.after_functions(at, one, state)
         if type(one) in _PLAIN or isinstance(one, self.passed):
-            return self.assign_point(context, row, one, state)
-        return self.part_otherwise(context, row, one, state)
+            return self.assign_point(at, one, state)
+        return self.part_otherwise(at, one, state)
 
-    def run_block(
-        self, context: Context, row: int, state: Arrived
-    ) -> tuple[int, Arrived] | None:
+    def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived] | None:
         """Run moves that follow each other; the visit of the first stands for all."""
-        behind = self._runs_of(context).get(row)
+        behind = self._runs_of(at.context).get(at.row)
         if behind is None:
             return None
-        after = self.act(context, row, context.place.statement(row), state)
+        after = self.act(at, at.statement, state)
         assert after is not None
-        (number,) = self._numbers[context, row]
-        self.visits[number].count = behind - row
-        file = context.place.scope.file
-        self.reached[file][row:behind] = True
+        (number,) = self._numbers[at]
+        self.visits[number].count = behind - at.row
+        self.reached[at.place.scope.file][at.row : behind] = True
         return behind, after
 
-    def before(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
-    ) -> Arrived:
+    def before(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived:
         """Allow for what the functions of a statement do."""
-        return self.after_functions(context, row, one, state)
+        return self.after_functions(at, one, state)
 
-    def lose_way(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Arrived
-    ) -> Arrived:
+    def lose_way(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived:
         """Go on behind a statement that leads to no place that is known."""
-        return self.unknown(context, row, state)
+        return self.unknown(at, state)
 
-    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+    def say_not_unrolled(self, at: At, rounds: int) -> None:
         """Say that a loop runs too often to be followed round by round."""
-        file = context.place.scope.file
-        self.say(file, row, Code.LOOP_NOT_UNROLLED, NOT_UNROLLED.format(rounds))
+        self.say(scope_at(at), Code.LOOP_NOT_UNROLLED, NOT_UNROLLED.format(rounds))
 
     def evaluate(
-        self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
+        self, at: At, operand: ir.Operand | None, state: Arrived
     ) -> float | str | None:
         """Return what the program itself has decided before, and ``WHILE TRUE``.
 
         What is switched off by data that somebody may set, or by FALSE, stays in the
         program as if it ran.
         """
-        one = context.place.statement(row)
+        one = at.statement
         endless = isinstance(one, ir.Branch) and one.word == "while"
         if endless and operand == ir.DataObject("true"):
             return True
-        here = replace(context.place.scope, points=state.points)
-        return self.task.decide(operand, row, here)
+        return self.task.decide(operand, scope_at(at, state))
 
-    def loop_limit(
-        self, context: Context, row: int, operand: ir.Operand | None, state: Arrived
-    ) -> float:
+    def loop_limit(self, at: At, operand: ir.Operand | None, state: Arrived) -> float:
         """Return a bound of a loop, NaN where it is not known."""
-        here = replace(context.place.scope, points=state.points)
-        return self.task.number(operand, row, here)
+        return self.task.number(operand, scope_at(at, state))
 
     def begin_round(
-        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Arrived
+        self, at: At, loop: ir.ForLoop, value: float, state: Arrived
     ) -> tuple[TaskPlace, Arrived]:
         """Return where the statements of a round stand, with the loop's variable."""
-        place = outer.place
+        place = at.place
         others = tuple(pair for pair in place.scope.loops if pair[0] != loop.name)
         scope = replace(place.scope, loops=(*others, (loop.name, value)))
         return replace(place, scope=scope), state
@@ -410,7 +382,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Tell whether the cell says that a routine neither moves nor sets frames."""
         return self.start.effect_of(name) == "motionless"
 
-    def outside(self, context: Context, row: int, name: str, here: Arrived) -> Arrived:
+    def outside(self, at: At, name: str, here: Arrived) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
         said_of_it = self.start.effect_of(name)
         if said_of_it in ("moves", "sets-frames"):
@@ -424,112 +396,101 @@ class TaskMachine(Interpreter[Arrived]):
             f"move the arm. Declare it under [routines] of the cell: {name} = "
             f'"motionless", or {name} = "moves"'
         )
-        return self.unknown(context, row, here, what)
+        return self.unknown(at, here, what)
 
-    def call_named(
-        self, context: Context, row: int, name: str, here: Arrived
-    ) -> Arrived | None:
+    def call_named(self, at: At, name: str, here: Arrived) -> Arrived | None:
         """Call a routine of the task by its name; None where it goes on there."""
-        found = self.task.routine(name, context.place.scope)
+        found = self.task.routine(name, at.place.scope)
         if found is not None:
-            return self.enter_routine(context, row, found, here)
+            return self.enter_routine(at, found, here)
         self.run_named_beside(name)
-        return self.unknown(context, row, here, "names several routines")
+        return self.unknown(at, here, "names several routines")
 
-    def call_function(
-        self, context: Context, row: int, name: str, still: bool, here: Arrived
-    ) -> Arrived:
+    def call_function(self, at: At, name: str, still: bool, here: Arrived) -> Arrived:
         """Allow for what a function does.
 
         Args:
-            context: Where the call stands.
-            row: .. and its row.
+            at: Where the call stands.
             name: Of the function.
             still: It is known not to move, if it is none of the task.
             here: How the arm comes to it.
         """
-        found = self.task.routine(name, context.place.scope)
+        found = self.task.routine(name, at.place.scope)
         what = ""
         if found is None and (name in self.task.routines or not still):
             what = f"calls the function {name}, which is not known: it may move"
         elif found is not None and self.routine_effects(found):
-            self.run_beside(found.file, found.rows)
+            self.run_beside(found)
             what = f"calls the function {name}, which moves: it is not followed"
-        return self.unknown(context, row, here, what) if what else here
+        return self.unknown(at, here, what) if what else here
 
     def enter_routine(
-        self, context: Context, row: int, found: TaskRoutine,
-        here: Arrived,
-    ) -> Arrived | None:  # fmt: skip
+        self, at: At, found: TaskRoutine, here: Arrived
+    ) -> Arrived | None:
         """Go on in a routine; one that is being run begins again as well.
 
         What holds behind such a call is not known.
         """
-        file, _, routine = found
         if self._is_recursive(found):
-            self.run_beside(file, routine)
-        calls = (one for one in calls_around(context) if one.place is not None)
-        running = next((one for one in calls if one.place.routine is routine), None)
+            self.run_beside(found)
+        calls = [one for one in calls_around(at.context) if one.place is not None]
+        running = next((one for one in calls if one.place.routine is found.rows), None)
         if running is not None:
-            first = running.place.flow.first
-            self.enter(running, first, self.at_call(running, here))
-            return self.unknown(context, row, here, RECURSIVE)
-        if sum(1 for _ in calls_around(context)) > DEEPEST:
-            self.run_beside(file, routine)
-            return self.unknown(context, row, here, RECURSIVE)
-        self.call_routine(found, context, row, here)
+            begin = At(running, running.place.flow.first)
+            self.enter(begin, self.at_call(running, here))
+            return self.unknown(at, here, RECURSIVE)
+        if len(calls) >= DEEPEST:
+            self.run_beside(found)
+            return self.unknown(at, here, RECURSIVE)
+        self.call_routine(found, at, here)
         return None
 
     def call_routine(
-        self, found: TaskRoutine, caller: Context, row: int, here: Arrived,
-    ) -> None:  # fmt: skip
+        self, found: TaskRoutine, caller: At | None, here: Arrived
+    ) -> None:
         """Begin a routine.
 
         Args:
             found: Its file, module and rows.
-            caller: Where the call stands; the root where nothing calls it.
-            row: .. and its row.
+            caller: Where the call stands, None where nothing calls it.
             here: How the arm comes to it.
         """
         file, module, routine = found
-        at = self.offsets[file] + routine.first
-        if caller is not self.root:
-            at = caller.place.offset + row
-        context = caller.find(at, CALLED)
+        at = self.offsets[file] + routine.first if caller is None else caller.job_row
+        around = self.root if caller is None else caller.context
+        context = around.find(at, CALLED)
         if context is None:
-            context = caller.within(at, CALLED, self._place_of(found, caller, row))
+            context = around.within(at, CALLED, self._place_of(found, caller))
         own = self.task.unit(file), module, context.place.scope.routine
         points = here.points.leave(own)  # declared anew
-        if (call := self._call_of(found, caller, row)) is not None:
-            there = replace(caller.place.scope, points=here.points)
-            points = self.task.hand_over(points, found, call, row, there)
+        if caller and (call := self._call_of(found, caller)) is not None:
+            there = scope_at(caller, here)
+            points = self.task.hand_over(points, found, call, there)
         here = here.with_points(points)
-        self.enter(context, context.place.flow.first, self.at_call(context, here))
+        self.enter(At(context, context.place.flow.first), self.at_call(context, here))
 
-    def _place_of(self, found: TaskRoutine, caller: Context, row: int) -> TaskPlace:
+    def _place_of(self, found: TaskRoutine, caller: At | None) -> TaskPlace:
         """Return where the statements of a routine stand that is called."""
-        file, module, routine = found
+        file, _, routine = found
         key, text = (file, routine.first), self.texts[file]
         if key not in self._flows:
             rows = text.where(is_structural, routine.first + 1, routine.last)
             handlers = text.where(self.handles, routine.first + 1, routine.last)
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
-        scope, call = None, self._call_of(found, caller, row)
-        if call is not None:
-            scope = self.task.bind(found, call, row, caller.place.scope)
-        scope = scope or self.task.scope_of(file, module, routine)
+        scope = None
+        if caller and (call := self._call_of(found, caller)) is not None:
+            scope = self.task.bind(found, call, scope_at(caller))
+        scope = scope or self.task.scope_of(found)
         return TaskPlace(scope, routine, self._flows[key], text, self.offsets[file])
 
-    def _call_of(
-        self, found: TaskRoutine, caller: Context, row: int
-    ) -> ir.Instruction | None:
+    def _call_of(self, found: TaskRoutine, caller: At) -> ir.Instruction | None:
         """Return a call whose arguments are followed; None where it has none.
 
         A routine that calls itself has other values the next time.
         """
-        if caller is self.root or not found.rows.head.parameters:
+        if not found.rows.head.parameters:
             return None
-        call = self.inside(self.texts[caller.place.scope.file].statement(row))
+        call = self.inside(caller.statement)
         if not isinstance(call, ir.Instruction) or call.name != found.rows.head.name:
             return None
         return None if self._is_recursive(found) else call
@@ -548,29 +509,25 @@ class TaskMachine(Interpreter[Arrived]):
         """The job-wide index of the first row of every file."""
         return [0, *accumulate(len(text) + 1 for text in self.texts)]
 
-    def arrive(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
-    ) -> Arrived:
+    def arrive(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Record the visits of a move; the arm then stands at the last.
 
         Args:
-            context: Where the move stands.
-            row: Its row.
-            one: .. and what it says.
+            at: Where the move stands.
+            one: What it says.
             here: How the arm comes to it.
         """
-        self.reached[context.place.scope.file][row] = True
-        known = self._numbers.get((context, row))
+        self.reached[at.place.scope.file][at.row] = True
+        known = self._numbers.get(at)
         if known is None:
-            found = [*self.read_visits(one, row, context.place.scope, here)]
+            found = [*self.read_visits(one, scope_at(at), here)]
             known = [*range(len(self.visits), len(self.visits) + len(found))]
-            self._numbers[context, row] = known
+            self._numbers[at] = known
             self.visits += found
-            at = context.place.offset + row
-            self.keys += [(context, at, k) for k in range(len(found))]
+            self.keys += [(at.context, at.job_row, k) for k in range(len(found))]
             for before, after in zip(known, found[1:], strict=False):
                 after.origins = frozenset([before])
-        self._take_again(context, row, one, here, known)
+        self._take_again(at, one, here, known)
         for number in known:
             visit = self.visits[number]
             if visit.modes != here.modes:
@@ -580,24 +537,20 @@ class TaskMachine(Interpreter[Arrived]):
         return replace(here, origins=frozenset([known[-1]]))
 
     def _take_again(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived,
-        known: Sequence[int],
-    ) -> None:  # fmt: skip
+        self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]
+    ) -> None:
         """Forget what visits are carried out with that differs where data do."""
         visits = [self.visits[number] for number in known]
         if not all(here.points.agree(visit.taken) for visit in visits):
-            again = self.read_visits(one, row, context.place.scope, here)
+            again = self.read_visits(one, scope_at(at), here)
             for visit, other in zip(visits, again, strict=True):
                 visit.meet(other)
 
-    def assign_point(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
-    ) -> Arrived:
+    def assign_point(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Note what an assignment gives to a point, or to a component of it."""
         if not isinstance(one, ir.Assignment):
             return here
-        points = self.task.assign(here.points, one, row, context.place.scope)
-        return here.with_points(points)
+        return here.with_points(self.task.assign(here.points, one, scope_at(at)))
 
     def begin(self, origins: frozenset[int], modes: Any) -> Arrived:
         """Return how the arm comes to where the task begins: no point is assigned."""
@@ -625,7 +578,7 @@ class TaskMachine(Interpreter[Arrived]):
     def _is_own(self, name: str, file: int, row: int) -> bool:
         """Return True for data that the routine around a statement declares anew."""
         routine = self.task.routine_around(file, row)
-        found = routine and self.task.datum(name, self.task.scope_of(*routine))
+        found = routine and self.task.datum(name, self.task.scope_of(routine))
         return bool(found and found[1].routine and found[1].kind != "pers")
 
     def pause(self, here: Arrived) -> None:
@@ -637,21 +590,17 @@ class TaskMachine(Interpreter[Arrived]):
         leads = set[int]().union(*(visit.origins for visit in self.visits))
         return self.lost | (self.paused & leads)
 
-    def unknown(
-        self, context: Context, row: int, here: Arrived, what: str = NOT_FOLLOWED
-    ) -> Arrived:
+    def unknown(self, at: At, here: Arrived, what: str = NOT_FOLLOWED) -> Arrived:
         """Say that a statement may move, and forget what was known."""
         self.lost |= here.origins
-        self.say(context.place.scope.file, row, Code.MOTION_UNKNOWN, what, quote=True)
+        self.say(scope_at(at), Code.MOTION_UNKNOWN, what, quote=True)
         return here.forget()
 
-    def say(
-        self, file: int, row: int, code: Code, what: str, quote: bool = False
-    ) -> None:
+    def say(self, place: Scope, code: Code, what: str, quote: bool = False) -> None:
         """Say something of a statement, with its beginning or without."""
-        text = self.texts[file]
-        message = f"{text.quote(row)} {what}" if quote else what
-        self.diagnostics.add(text.diagnostic(row, code, message))
+        text = self.texts[place.file]
+        message = f"{text.quote(place.row)} {what}" if quote else what
+        self.diagnostics.add(text.diagnostic(place.row, code, message))
 
     # What routines may do, read off their texts.
 
@@ -677,7 +626,7 @@ class TaskMachine(Interpreter[Arrived]):
     def _read_routine(self, routine: TaskRoutine) -> tuple[Effects, list[TaskRoutine]]:
         """Read once what the statements of a routine do, and what they call."""
         if routine.key not in self._read:
-            here = self.task.scope_of(*routine)
+            here = self.task.scope_of(routine)
             self._read[routine.key] = self.read_rows(here, routine.inside)
         return self._read[routine.key]
 
@@ -714,16 +663,16 @@ class TaskMachine(Interpreter[Arrived]):
 
     # What runs, and is not followed.
 
-    def run_beside(self, file: int, routine: HeadedRows) -> None:
+    def run_beside(self, routine: TaskRoutine) -> None:
         """Note a routine that runs at a time, or in a way, that is not followed."""
-        self.beside.add((file, routine.first, routine.last))
+        self.beside.add((routine.file, routine.rows.first, routine.rows.last))
 
     def run_named_beside(self, name: str) -> None:
         """Note all routines of a name."""
-        for file, _, routine in self.task.routines.get(name, ()):
-            self.run_beside(file, routine)
+        for routine in self.task.routines.get(name, ()):
+            self.run_beside(routine)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+    def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return the routines that a statement may call."""
         names = {*self.names_called(one)}
         return [found for name in names for found in self.task.routines.get(name, ())]
@@ -748,7 +697,7 @@ class TaskMachine(Interpreter[Arrived]):
         routine = self.task.routine_around(file, row)
         for scope in () if routine is None else self.scopes_of(routine):
             one = self.texts[file].statement(row)
-            for visit in self.read_visits(one, row, scope, None):
+            for visit in self.read_visits(one, scope.at(row), None):
                 yield visit.goal
 
     def rows_beside(self) -> Iterator[tuple[int, int]]:
@@ -764,7 +713,7 @@ class TaskMachine(Interpreter[Arrived]):
         """Yield the routines that some statements call."""
         file, first, behind = part
         for row in range(first, behind):
-            for at, _, one in self.calls_of(file, self.texts[file].statement(row)):
+            for at, _, one in self.calls_of(self.texts[file].statement(row)):
                 yield at, one.first, one.last
 
     def find_unreached(self) -> dict[str, Ints]:
@@ -778,6 +727,13 @@ class TaskMachine(Interpreter[Arrived]):
                 lines = np.unique(text.begin_line[missed]).astype(np.int64)
                 found[text.source.name] = lines
         return found
+
+
+def scope_at(at: At, here: Arrived | None = None) -> Scope:
+    """Return where a statement stands, with what points hold there if that counts."""
+    points = NO_POINTS if here is None else here.points
+    scope: Scope = replace(at.place.scope, row=at.row, points=points)
+    return scope
 
 
 def follow(make: Callable[[], M]) -> M:

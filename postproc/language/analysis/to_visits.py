@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import (
-    Callable,
     Collection,
     Hashable,
+    Iterable,
     Iterator,
     Mapping,
     Sequence,
     Set,
 )
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from postproc.arrays import Floats, Indices, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import visits
 from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.conditions import Conditions, Zone
 from postproc.language.analysis.found_visits import (
@@ -41,15 +44,6 @@ from postproc.language.analysis.visit_columns import (
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.statement_table import StatementText
-from postproc.language.visits import (
-    Blend,
-    Graph,
-    Literals,
-    Meaning,
-    Visits,
-    ZoneRule,
-    texts_of,
-)
 
 ONLY_SHIFTED = Reason(
     Code.NUMBERS_NOT_OWN,
@@ -89,204 +83,273 @@ def zone_at(
         unsized: It may be a stop, or be passed in a zone of any size.
     """
     if overlap >= 0.0:
-        return Zone(size_mm if size_mm >= 0.0 else math.nan, overlap, Blend.OVERLAP)
+        return Zone(
+            size_mm if size_mm >= 0.0 else math.nan, overlap, visits.Blend.OVERLAP
+        )
     if not (via or exact or unsized or size_mm >= 0.0):
         return Zone(overlap_percent=100.0)
-    rule = ZoneRule.PASS if exact else ZoneRule.FROM
-    rule = ZoneRule.UNKNOWN if unsized and not via else rule
+    rule = visits.ZoneRule.PASS if exact else visits.ZoneRule.FROM
+    rule = visits.ZoneRule.UNKNOWN if unsized and not via else rule
     size = size_mm if size_mm >= 0.0 else math.nan
-    return Zone(size, 100.0, Blend.ZONE, rule)
+    return Zone(size, 100.0, visits.Blend.ZONE, rule)
 
 
-def visits_of(
-    machine: TaskMachine,
-    dialect: Dialect,
-    arrive: Callable[[Any], Arrival],
-) -> Visits:
-    """Put the arrivals into the order of the program, as columns.
+# Which numbers must stay, and which targets move along with others.
 
-    Args:
-        machine: It has followed all ways.
+_NO_LITERAL = -2  # follows numbers that are no literal
+MOST_NUMBERS = 17  # of a target
+UNKNOWN_POINT = "its move shifts a point, too, whose numbers are not known or computed"
+TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
+ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
+ANY_VALUE = "a move goes to {} where only the run tells what it holds"
+BESIDE = (
+    "the move in line {} of {} goes there too: how it is reached there is not followed"
+)
+
+
+class TaskCollector(ABC):
+    """Makes visits, n, of what a machine has found, r, in the order of the program.
+
+    Attributes:
         dialect: What the numbers mean.
-        arrive: Says what an arrival is carried out with.
-    """
-    keys = [(Point(context, at), k) for context, at, k in machine.keys]
-    order = sorted(range(len(keys)), key=keys.__getitem__)
-    found: list[FoundVisit] = [machine.visits[k] for k in order]
-    runs = _Runs.of(found)
-    numbering = Numbering.of([(text.source, text.numbers) for text in machine.texts])
-    written = _Written.of(found)
-    followed = _find_followed(found, written)
-    columns = _fill(found, runs, numbering, machine, dialect.width)
-    _fill_conditions(columns, [arrive(v) for v in found], followed, machine, runs)
-    columns.taught = np.array(_find_taught(found, machine), bool)[runs.owner]
-    columns.measured = _read_measure_ids(found, machine)
-    literals, literal = find_literals(columns, numbering)
-    columns.slots = columns.slots[:0].copy()  # the others need the room
-    own = np.append(literal[runs.begin[written.example]], -1)  # each one's first
-    other = [*_goals_beside(machine)]
-    pinned = _find_pinned(found, written, other, machine.task.uses.copies)
-    _hold_for_taught(pinned, found, written.index, machine)
-    return to_visits(
-        columns,
-        [text.source.name for text in machine.texts],
-        _graph(machine, order, runs),
-        _pin(literals, literal, pinned, written, runs),
-        literal,
-        own[np.maximum(followed, -1)][runs.owner],
-        dialect,
-    )
-
-
-@dataclass(frozen=True)
-class _Runs:
-    """Visits that were found as one.
-
-    Attributes:
-        counts: How many each found one stands for, (r,).
-        begin: The first of them, (r,).
-        owner: The found one of each visit, (n,).
-        inside: Its place there, (n,).
+        machine: It has followed all ways.
     """
 
-    counts: Ints
-    begin: Ints
-    owner: Indices
-    inside: Indices
+    dialect: ClassVar[Dialect]
 
-    @classmethod
-    def of(cls, found: Sequence[FoundVisit]) -> _Runs:
-        """Count the visits that found ones stand for."""
-        counts = np.array([v.count for v in found], np.int64)
-        return cls(counts, np.cumsum(counts) - counts, *within(counts))
-
-
-@dataclass(frozen=True)
-class _Written:
-    """The m numbers that moves may have written anew, each once.
-
-    Attributes:
-        index: Of each, by its file and first number there.
-        example: The first found visit that goes there, (m,).
-    """
-
-    index: dict[tuple[int, int], int]
-    example: Ints
-
-    @classmethod
-    def of(cls, found: Sequence[FoundVisit]) -> _Written:
-        """List what moves write."""
-        first = dict[tuple[int, int], int]()
-        for k, v in enumerate(found):
+    def __init__(self, machine: Any) -> None:
+        """Sort what was found; what counts for several is filled for all of them."""
+        self.machine: TaskMachine = machine
+        keys = [(Point(context, at), k) for context, at, k in machine.keys]
+        self.order = sorted(range(len(keys)), key=keys.__getitem__)
+        self.found: list[FoundVisit] = [machine.visits[k] for k in self.order]
+        self.counts = np.array([v.count for v in self.found], np.int64)
+        self.begin = np.cumsum(self.counts) - self.counts  # the first visit of each
+        self.owner, self.inside = within(self.counts)  # of each visit: (n,)
+        texts = [(text.source, text.numbers) for text in machine.texts]
+        self.numbering = Numbering.of(texts)
+        first = dict[tuple[int, int], int]()  # by the numbers that moves write
+        for k, v in enumerate(self.found):
             file, slots = v.goal.writes
             if slots[0] >= 0:
                 first.setdefault((file, slots[0]), k)
-        index = {place: k for k, place in enumerate(first)}
-        return cls(index, np.array([*first.values()], np.int64))
+        self.index = {place: k for k, place in enumerate(first)}
+        self.example = [*first.values()]
 
+    @abstractmethod
+    def arrive(self, v: Any) -> Arrival:
+        """Say what an arrival is carried out with."""
 
-def _fill(
-    found: Sequence[FoundVisit],
-    runs: _Runs,
-    numbering: Numbering,
-    machine: TaskMachine,
-    width: int,
-) -> VisitColumns:
-    """Fill where moves stand and where they go."""
-    aux = _aux(found)
-    n, owner = len(runs.owner), runs.owner
-    c = VisitColumns(n, width, aux.shape[1], len(numbering))
-    c.file[:] = np.array([v.scope.file for v in found], np.int64)[owner]
-    row = np.array([v.row for v in found], np.int32)[owner] + runs.inside
-    for number, text in enumerate(machine.texts):
-        mine = c.file == number
-        c.line[mine] = text.begin_line[row[mine]]
-    c.motion[:] = np.array([v.motion for v in found], np.int64)[owner]
-    c.target[:] = np.array([v.goal.target for v in found], np.int64)[owner]
-    c.via[:] = np.array([v.via for v in found], bool)[owner]
-    c.arc_angle = np.array([v.arc_angle for v in found], float)[owner]
-    c.block = np.append(runs.begin, -1)[_blocks(found)].astype(np.int32)[owner]
-    c.curved = np.array([v.curved for v in found], bool)[owner]
-    c.aux[:] = aux[owner]
-    c.name[:] = c.names.of([v.goal.name for v in found])[owner]
-    shifts = [v.goal.shift if v.goal.target == Meaning.POSE else None for v in found]
-    own = [-1 if one is None else c.shifts[one.shift] for one in shifts]
-    c.shift = np.array(own, np.int64)[owner]
-    shared = [v.goal.shared and not v.goal.is_rewritten_by_shift for v in found]
-    c.shared[:] = np.array(shared, bool)[owner]
-    if n:
-        c.values[:] = np.array([v.goal.values for v in found], float)[owner]
-    _fill_numbers(c, found, runs, numbering, machine)
-    return c
+    def collect(self) -> visits.Visits:
+        """Put the arrivals into columns."""
+        machine, followed = self.machine, self._find_followed()
+        self._fill()
+        self._fill_numbers()
+        self._fill_conditions([self.arrive(v) for v in self.found], followed)
+        c = self.columns
+        c.taught = np.array(self._find_taught(), bool)[self.owner]
+        c.measured = self._read_measure_ids()
+        literals, literal = find_literals(c, self.numbering)
+        c.slots = c.slots[:0].copy()  # the others need the room
+        first = self.begin[np.array(self.example, np.int64)]
+        own = np.append(literal[first], -1)  # each one's first
+        pinned = self._find_pinned([*_goals_beside(machine)])
+        self._hold_for_taught(pinned)
+        return to_visits(
+            c,
+            [text.source.name for text in machine.texts],
+            self._graph(),
+            self._pin(literals, literal, pinned),
+            literal,
+            own[np.maximum(followed, -1)][self.owner],
+            self.dialect,
+        )
 
+    def _spread(self, own: Iterable[Any], dtype: DTypeLike) -> NDArray[Any]:
+        """Return what is said of what was found, for every visit, (n, ..)."""
+        return np.array([*own], dtype)[self.owner]
 
-def _fill_numbers(
-    columns: VisitColumns,
-    found: Sequence[FoundVisit],
-    runs: _Runs,
-    numbering: Numbering,
-    machine: TaskMachine,
-) -> None:
-    """Fill which numbers are those of a target; of runs also what they are."""
-    for k, v in enumerate(found):
-        file, slots = v.goal.writes
-        if slots[0] < 0:
-            continue
-        rows = slice(runs.begin[k], runs.begin[k] + v.count)
-        own = np.array(slots)
-        is_written, base = own >= 0, int(numbering.first[file])
-        if v.count == 1:
-            columns.slots[rows.start, is_written] = own[is_written] + base
-            continue
-        text = machine.texts[file]
-        stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
-        steps = stride * np.arange(v.count)
-        for column in np.flatnonzero(is_written).tolist():  # one by one: short of room
-            places = own[column] + steps
-            columns.slots[rows, column] = places + base
-            columns.values[rows, column] = text.value[places]
+    def _fill(self) -> None:
+        """Fill where moves stand and where they go."""
+        found, owner, aux = self.found, self.owner, _aux(self.found)
+        numbers = len(self.numbering)
+        c = VisitColumns(len(owner), self.dialect.width, aux.shape[1], numbers)
+        self.columns = c
+        c.file[:] = self._spread((v.scope.file for v in found), np.int64)
+        row = self._spread((v.row for v in found), np.int32) + self.inside
+        for number, text in enumerate(self.machine.texts):
+            mine = c.file == number
+            c.line[mine] = text.begin_line[row[mine]]
+        c.motion[:] = self._spread((v.motion for v in found), np.int64)
+        c.target[:] = self._spread((v.goal.target for v in found), np.int64)
+        c.via[:] = self._spread((v.via for v in found), bool)
+        c.arc_angle = self._spread((v.arc_angle for v in found), float)
+        c.block = np.append(self.begin, -1)[_blocks(found)].astype(np.int32)[owner]
+        c.curved = self._spread((v.curved for v in found), bool)
+        c.aux[:] = aux[owner]
+        c.name[:] = c.names.of([v.goal.name for v in found])[owner]
+        goals, pose = [v.goal for v in found], visits.Meaning.POSE
+        posed = (goal.shift if goal.target == pose else None for goal in goals)
+        own = (-1 if one is None else c.shifts[one.shift] for one in posed)
+        c.shift = self._spread(own, np.int64)
+        shared = (one.shared and not one.is_rewritten_by_shift for one in goals)
+        c.shared[:] = self._spread(shared, bool)
+        if len(owner):
+            c.values[:] = self._spread((v.goal.values for v in found), float)
 
+    def _fill_numbers(self) -> None:
+        """Fill which numbers are those of a target; of runs also what they are."""
+        c = self.columns
+        for k, v in enumerate(self.found):
+            file, slots = v.goal.writes
+            if slots[0] < 0:
+                continue
+            rows = slice(self.begin[k], self.begin[k] + v.count)
+            own = np.array(slots)
+            is_written, base = own >= 0, int(self.numbering.first[file])
+            if v.count == 1:
+                c.slots[rows.start, is_written] = own[is_written] + base
+                continue
+            text = self.machine.texts[file]
+            stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
+            steps = stride * np.arange(v.count)
+            for at in np.flatnonzero(is_written).tolist():  # one by one: short of room
+                places = own[at] + steps
+                c.slots[rows, at] = places + base
+                c.values[rows, at] = text.value[places]
 
-def _fill_conditions(
-    columns: VisitColumns,
-    arrivals: Sequence[Arrival],
-    followed: Ints,
-    machine: TaskMachine,
-    runs: _Runs,
-) -> None:
-    """Fill what moves are carried out with, and why they must stay."""
-    c, owner = columns, runs.owner
-    c.condition[:] = c.conditions.of([one.conditions for one in arrivals])[owner]
-    flies = [one.conditions.zone.blend != Blend.UNSET for one in arrivals]
-    c.fly[:] = np.array(flies, bool)[owner]
-    c.config_given[:] = np.array([one.flagged for one in arrivals], bool)[owner]
-    reasons = [
-        TOO_COMPLEX if machine.exhausted else next(filter(None, one.reasons), NO_REASON)
-        for one in arrivals
-    ]
-    for k in np.flatnonzero(followed == _NO_LITERAL).tolist():
-        reasons[k] = reasons[k] or ONLY_SHIFTED
-    c.reason[:] = c.reasons.of(reasons)[owner]
+    def _fill_conditions(self, arrivals: Sequence[Arrival], followed: Ints) -> None:
+        """Fill what moves are carried out with, and why they must stay."""
+        c, owner = self.columns, self.owner
+        c.condition[:] = c.conditions.of([one.conditions for one in arrivals])[owner]
+        flies = (one.conditions.zone.blend != visits.Blend.UNSET for one in arrivals)
+        c.fly[:] = self._spread(flies, bool)
+        c.config_given[:] = self._spread((one.flagged for one in arrivals), bool)
+        reasons = [
+            TOO_COMPLEX
+            if self.machine.exhausted
+            else next(filter(None, one.reasons), NO_REASON)
+            for one in arrivals
+        ]
+        for k in np.flatnonzero(followed == _NO_LITERAL).tolist():
+            reasons[k] = reasons[k] or ONLY_SHIFTED
+        c.reason[:] = c.reasons.of(reasons)[owner]
 
+    def _read_measure_ids(self) -> dict[int, str]:
+        """Return the ids that comments give to visits."""
+        ids, task = dict[tuple[int, int], str](), self.machine.task
+        for number, file in enumerate(task.files):
+            text, rows = file.text, file.moves
+            marks = [*task.comments.marks(text.source, MEASURE)]
+            last = text.source.lines_of(text.end[rows]) if marks else rows
+            for line, mark in marks:
+                at = int(np.searchsorted(last, line))
+                if at < len(rows):
+                    ids.setdefault((number, int(rows[at])), mark)
+        if not ids:
+            return {}
+        each = ((v, k) for v in self.found for k in range(v.count))
+        own = ("" if v.via else ids.get((v.scope.file, v.row + k), "") for v, k in each)
+        return {visit: mark for visit, mark in enumerate(own) if mark}
 
-def _read_measure_ids(
-    found: Sequence[FoundVisit], machine: TaskMachine
-) -> dict[int, str]:
-    """Return the ids that comments give to visits."""
-    ids: dict[tuple[int, int], str] = {}
-    for number, file in enumerate(machine.task.files):
-        text, rows = file.text, file.moves
-        marks = [*machine.task.comments.marks(text.source, MEASURE)]
-        last = text.source.lines_of(text.end[rows]) if marks else rows
-        for line, mark in marks:
-            at = int(np.searchsorted(last, line))
-            if at < len(rows):
-                ids.setdefault((number, int(rows[at])), mark)
-    if not ids:
-        return {}
-    each = ((v, k) for v in found for k in range(v.count))
-    own = ("" if v.via else ids.get((v.scope.file, v.row + k), "") for v, k in each)
-    return {visit: mark for visit, mark in enumerate(own) if mark}
+    def _graph(self) -> visits.Graph:
+        """Translate origins to visits in program order: they end a run."""
+        ends = (self.begin + self.counts - 1).tolist()
+        last = dict(zip(self.order, ends, strict=True))
+        origins = [
+            sorted(last[p] if p >= 0 else p for p in v.origins) for v in self.found
+        ]
+        return chain_visits(self.counts, origins)
+
+    def _pin(
+        self, literals: visits.Literals, literal: Indices, pinned: Sequence[str]
+    ) -> visits.Literals:
+        """Say of literals why they must stay; what pins a first one pins its run."""
+        texts = dict[int, str]()
+        for k, why in zip(self.example, pinned, strict=True):
+            if why:
+                own = literal[self.begin[k] : self.begin[k] + self.counts[k]]
+                texts |= dict.fromkeys(own[own >= 0].tolist(), why)
+        return replace(literals, pinned=visits.texts_of(len(literals), texts))
+
+    def _find_followed(self) -> Ints:
+        """Find what computed targets move along with, (r,), -1 for none.
+
+        Where a shift can make up for all, the point need be no move's own. Targets do
+        not move along with a point that stays.
+        """
+        follows = np.full(len(self.found), -1, dtype=np.int64)
+        for k, v in enumerate(self.found):
+            if v.goal.slots[0] < 0 <= v.goal.follows[0]:
+                none = -1 if v.goal.is_rewritten_by_shift else _NO_LITERAL
+                known = v.goal.target == visits.Meaning.POSE and not v.goal.stays
+                follows[k] = self.index.get(v.goal.point, none) if known else -1
+        return follows
+
+    def _find_pinned(self, other: Sequence[tuple[FoundGoal, str]]) -> list[str]:
+        """Say why numbers that are written must stay, "" where they need not.
+
+        Args:
+            other: Where moves go that run beside, and why those numbers stay.
+        """
+        found, index = self.found, self.index
+        goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
+        # Of moves to an element of an array that is not known.
+        elements = {goal.name: why for goal, why in (*goals, *other)
+                    if goal.name and max(goal.slots[0], goal.follows[0]) < 0
+                    and not array_of(goal.name)}  # fmt: skip
+        elements |= {
+            name: ANY_VALUE.format(name) for v in found for name in v.goal.doubtful
+        }
+        stays = {goal.point: why for goal, why in other}
+        stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
+        pinned = []
+        for v in (found[k] for k in self.example):
+            file, slots = v.goal.writes
+            by = v.goal.shift if v.goal.is_rewritten_by_shift else None
+            own = elements.get(array_of(v.goal.name), "") if by is None else by.pins
+            pinned.append(stays.get((file, slots[0]), "") or own)
+        uncertain = _find_uncertain({*elements}, self.machine.task.uses.copies)
+        copied = uncertain - elements.keys()
+        for v in found:
+            unknown = {v.goal.name} & copied
+            for point in v.goal.given:
+                unknown |= point.names & uncertain
+            if unknown:
+                place = v.goal.writes[0], v.goal.writes[1][0]
+                for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
+                    pinned[at] = pinned[at] or ANY_VALUE.format(min(unknown))
+            at = index.get(v.goal.point, -1)
+            if at >= 0:
+                pinned[at] = pinned[at] or v.goal.pins
+            for shift in {index.get(place, -1) for place in v.goal.holds} - {-1}:
+                pinned[shift] = pinned[shift] or UNKNOWN_POINT
+        return pinned
+
+    def _hold_for_taught(self, pinned: list[str]) -> None:
+        """Hold the points of targets that are computed and marked as taught."""
+        lines = self.machine.task.taught_lines
+        for v in self.found if any(lines) else ():
+            at, file = self.index.get(v.goal.point, -1), v.scope.file
+            if at < 0 or v.goal.slots[0] >= 0 or v.goal.is_rewritten_by_shift:
+                continue
+            if not lines[file].isdisjoint(self.machine.texts[file].lines(v.row)):
+                pinned[at] = pinned[at] or TAUGHT_SHIFT
+
+    def _find_taught(self) -> list[bool]:
+        """Tell which go to taught points, or to targets shifted from one, (r,)."""
+        taught = self.machine.start.taught
+        if not (any(self.machine.task.taught_lines) or taught):
+            return [False] * len(self.found)
+        goals = [v.goal for v in self.found]
+        places = [{(one.writes[0], one.writes[1][0]), one.point} for one in goals]
+        written = {place for some in places for place in some if place[1] >= 0}
+        marked = _find_marked(written, self.machine)
+        return [
+            whole_name(one.name).strip().lower() in taught
+            or not marked.isdisjoint(some)
+            for one, some in zip(goals, places, strict=True)
+        ]
 
 
 def _blocks(found: Sequence[FoundVisit]) -> Ints:
@@ -304,109 +367,6 @@ def _aux(found: Sequence[FoundVisit]) -> Floats:
     return aux[:, : int(used.max(initial=-1)) + 1]
 
 
-def _graph(machine: TaskMachine, order: Sequence[int], runs: _Runs) -> Graph:
-    """Translate origins to visits in program order: they end a run."""
-    last = dict(zip(order, (runs.begin + runs.counts - 1).tolist(), strict=True))
-    origins = [
-        sorted(last[p] if p >= 0 else p for p in machine.visits[k].origins)
-        for k in order
-    ]
-    return chain_visits(runs.counts, origins)
-
-
-# Which numbers must stay, and which targets move along with others.
-
-_NO_LITERAL = -2  # follows numbers that are no literal
-MOST_NUMBERS = 17  # of a target
-UNKNOWN_POINT = "its move shifts a point, too, whose numbers are not known or computed"
-TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
-ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
-ANY_VALUE = "a move goes to {} where only the run tells what it holds"
-BESIDE = (
-    "the move in line {} of {} goes there too: how it is reached there is not followed"
-)
-
-
-def _pin(
-    literals: Literals,
-    literal: Indices,
-    pinned: Sequence[str],
-    written: _Written,
-    runs: _Runs,
-) -> Literals:
-    """Say of literals why they must stay; what pins a run's first pins all of it."""
-    texts = dict[int, str]()
-    for k, why in zip(written.example.tolist(), pinned, strict=True):
-        if why:
-            own = literal[runs.begin[k] : runs.begin[k] + runs.counts[k]]
-            texts |= dict.fromkeys(own[own >= 0].tolist(), why)
-    return replace(literals, pinned=texts_of(len(literals), texts))
-
-
-def _find_followed(found: Sequence[FoundVisit], written: _Written) -> Ints:
-    """Find what computed targets move along with, (r,), -1 for none.
-
-    Where a shift can make up for all, the point need be no move's own. Targets do not
-    move along with a point that stays.
-    """
-    follows = np.full(len(found), -1, dtype=np.int64)
-    for k, v in enumerate(found):
-        if v.goal.slots[0] < 0 <= v.goal.follows[0]:
-            none = -1 if v.goal.is_rewritten_by_shift else _NO_LITERAL
-            known = v.goal.target == Meaning.POSE and not v.goal.stays
-            follows[k] = written.index.get(v.goal.point, none) if known else -1
-    return follows
-
-
-def _find_pinned(
-    found: Sequence[FoundVisit],
-    written: _Written,
-    other: Sequence[tuple[FoundGoal, str]],
-    copies: Set[tuple[str, str]],
-) -> list[str]:
-    """Say why numbers that are written must stay, "" where they need not.
-
-    Args:
-        found: The visits.
-        written: What their moves write.
-        other: Where moves go that run beside, and why those numbers stay.
-        copies: Points and what they are copied from.
-    """
-    index = written.index
-    goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
-    # Of moves to an element of an array that is not known.
-    elements = {goal.name: why for goal, why in (*goals, *other)
-                if goal.name and max(goal.slots[0], goal.follows[0]) < 0
-                and not array_of(goal.name)}  # fmt: skip
-    elements |= {
-        name: ANY_VALUE.format(name) for v in found for name in v.goal.doubtful
-    }
-    stays = {goal.point: why for goal, why in other}
-    stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
-    pinned = []
-    for v in (found[k] for k in written.example.tolist()):
-        file, slots = v.goal.writes
-        by = v.goal.shift if v.goal.is_rewritten_by_shift else None
-        own = elements.get(array_of(v.goal.name), "") if by is None else by.pins
-        pinned.append(stays.get((file, slots[0]), "") or own)
-    uncertain = _find_uncertain({*elements}, copies)
-    copied = uncertain - elements.keys()
-    for v in found:
-        unknown = {v.goal.name} & copied
-        for point in v.goal.given:
-            unknown |= point.names & uncertain
-        if unknown:
-            place = v.goal.writes[0], v.goal.writes[1][0]
-            for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
-                pinned[at] = pinned[at] or ANY_VALUE.format(min(unknown))
-        at = index.get(v.goal.point, -1)
-        if at >= 0:
-            pinned[at] = pinned[at] or v.goal.pins
-        for shift in {index.get(place, -1) for place in v.goal.holds} - {-1}:
-            pinned[shift] = pinned[shift] or UNKNOWN_POINT
-    return pinned
-
-
 def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> set[str]:
     """Add what points are made from that moves go to where they are not known.
 
@@ -420,24 +380,6 @@ def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> set[str]:
     return found
 
 
-def _hold_for_taught(
-    pinned: list[str],
-    found: Sequence[FoundVisit],
-    index: Mapping[tuple[int, int], int],
-    machine: TaskMachine,
-) -> None:
-    """Hold the points of targets that are computed and marked as taught, in place."""
-    lines = machine.task.taught_lines
-    if not any(lines):
-        return
-    for v in found:
-        at, file = index.get(v.goal.point, -1), v.scope.file
-        if at < 0 or v.goal.slots[0] >= 0 or v.goal.is_rewritten_by_shift:
-            continue
-        if not lines[file].isdisjoint(machine.texts[file].lines(v.row)):
-            pinned[at] = pinned[at] or TAUGHT_SHIFT
-
-
 def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
     """Yield where moves go that run in ways that are not followed, and say so."""
     files = machine.task.files  # and no others: of those beside the task nothing moves
@@ -448,21 +390,6 @@ def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
         why = BESIDE.format(text.line(row), text.source.name)
         for goal in machine.goals_of(file, row):
             yield goal, why
-
-
-def _find_taught(found: Sequence[FoundVisit], machine: TaskMachine) -> list[bool]:
-    """Tell which visits go to taught points, or to targets shifted from one, (r,)."""
-    lines = machine.task.taught_lines
-    if not (any(lines) or machine.start.taught):
-        return [False] * len(found)
-    places = [{(v.goal.writes[0], v.goal.writes[1][0]), v.goal.point} for v in found]
-    written = {place for some in places for place in some if place[1] >= 0}
-    marked = _find_marked(written, machine)
-    return [
-        whole_name(v.goal.name).strip().lower() in machine.start.taught
-        or not marked.isdisjoint(some)
-        for v, some in zip(found, places, strict=True)
-    ]
 
 
 def _find_marked(

@@ -20,6 +20,7 @@ from postproc.arrays import (
     spans,
 )
 from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.language import visits
 from postproc.language.analysis.conditions import (
     ConditionColumns,
     Conditions,
@@ -29,16 +30,6 @@ from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
 from postproc.language.text.source import NumberSpans, Source
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.visits import (
-    Graph,
-    Literals,
-    Meaning,
-    NumberPlaces,
-    PlaceColumns,
-    TargetColumns,
-    Visits,
-    texts_of,
-)
 
 TOO_COMPLEX = Reason(Code.TOO_COMPLEX, "the program is too complex to be followed")
 TORN = Reason(
@@ -108,12 +99,12 @@ class VisitColumns:
 def to_visits(
     columns: VisitColumns,
     files: Sequence[str],
-    graph: Graph,
-    literals: Literals,
+    graph: visits.Graph,
+    literals: visits.Literals,
     literal: Indices,
     follows: Indices,
     dialect: Dialect,
-) -> Visits:
+) -> visits.Visits:
     """Make visits of columns.
 
     Args:
@@ -128,10 +119,12 @@ def to_visits(
     c = columns
     conditions = ConditionColumns(c.conditions, c.condition)
     own = VisitMotion(c.motion, c.via, c.fly, c.arc_angle, c.block, c.curved)
-    return Visits(
+    return visits.Visits(
         files=tuple(files),
-        place=PlaceColumns(slim(c.file), slim(c.line), texts_of(len(c), c.measured)),
-        target=TargetColumns(
+        place=visits.PlaceColumns(
+            slim(c.file), slim(c.line), visits.texts_of(len(c), c.measured)
+        ),
+        target=visits.TargetColumns(
             meaning=slim(c.target),
             values=c.values,
             distance_mm=slim(c.distance_mm),
@@ -158,7 +151,7 @@ def to_visits(
     )
 
 
-def chain_visits(counts: Ints, origins: Sequence[Sequence[int]]) -> Graph:
+def chain_visits(counts: Ints, origins: Sequence[Sequence[int]]) -> visits.Graph:
     """Say where the arm comes from: in a run of visits each follows the one before.
 
     Args:
@@ -175,7 +168,7 @@ def chain_visits(counts: Ints, origins: Sequence[Sequence[int]]) -> Graph:
     pred = np.repeat(np.arange(-1, n - 1, dtype=np.int32), own)
     if n:
         pred[spans(start[first], own[first])] = [*chain.from_iterable(origins)]
-    return Graph(start, pred)
+    return visits.Graph(start, pred)
 
 
 # Which numbers of which file belong to which target.
@@ -211,7 +204,7 @@ class Numbering:
         found: Ints = np.searchsorted(self.first[1:], slots, side="right")
         return found.astype(np.int32)
 
-    def places(self, slots: Indices, file: Indices) -> NumberPlaces:
+    def places(self, slots: Indices, file: Indices) -> visits.NumberPlaces:
         """Tell where the numbers of targets stand.
 
         Args:
@@ -219,11 +212,11 @@ class Numbering:
             file: The file of each, (m,).
         """
         rows = max(len(slots), 1)
-        return NumberPlaces.join(
+        return visits.NumberPlaces.join(
             map_chunks(lambda k: self._of(slots[k], file[k]), rows)
         )
 
-    def _of(self, slots: Indices, file: Indices) -> NumberPlaces:
+    def _of(self, slots: Indices, file: Indices) -> visits.NumberPlaces:
         start, end = np.full((2, *slots.shape), -1, dtype=np.int32)
         for number in np.unique(file).tolist():
             mine = slots >= 0
@@ -231,7 +224,7 @@ class Numbering:
             own = slots[mine] - self.first[number]
             numbers = self.numbers[number]
             start[mine], end[mine] = numbers.starts(own), numbers.ends(own)
-        return NumberPlaces.of(start, end)
+        return visits.NumberPlaces.of(start, end)
 
     def apart(self, slots: Indices) -> Bools:
         """Tell which targets have their numbers in more than one file, (k,).
@@ -248,7 +241,7 @@ class Numbering:
 
 def find_literals(
     columns: VisitColumns, numbering: Numbering
-) -> tuple[Literals, Indices]:
+) -> tuple[visits.Literals, Indices]:
     """Find the distinct literals; also return the literal of every visit.
 
     Visits whose numbers partly belong to another target, or to another file, get none
@@ -310,7 +303,7 @@ def _literals(
     slots: Indices,
     visit: Indices,
     literal: Indices,
-) -> Literals:
+) -> visits.Literals:
     file = numbering.file(slots[:, 0])
     places = numbering.places(slots, file)
     line = np.zeros(len(slots), dtype=np.int32)
@@ -318,12 +311,12 @@ def _literals(
         mine = file == i
         first = places.first[mine]
         line[mine] = source.lines_of(first)
-    own, unnamed = columns.name[visit].astype(np.int64), texts_of(len(slots), {})
-    return Literals(
+    own, unnamed = columns.name[visit].astype(np.int64), visits.texts_of(len(slots), {})
+    return visits.Literals(
         file=slim(file),
         line=line,
         places=places,
-        joints=columns.target[visit] == Meaning.JOINTS,
+        joints=columns.target[visit] == visits.Meaning.JOINTS,
         name=columns.names.take(own) if own.any() else unnamed,
         shared=slim(_any(columns.shared, literal, len(slots))),
         taught=slim(_any(columns.taught, literal, len(slots))),

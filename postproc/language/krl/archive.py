@@ -61,7 +61,7 @@ def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KnownRecord]]:
     here = Scope(0, task.files[0].name, "")
     for datum in task.files[0].data:
         if datum.name == table and datum.index:
-            value = task.value(datum.value, datum.row, here)
+            value = task.value(datum.value, here.at(datum.row))
             if not isinstance(value, KnownRecord):
                 continue
             given = any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
@@ -85,7 +85,7 @@ def _home(task: KrlTask) -> tuple[float, ...]:
     here = Scope(0, task.files[0].name, "")
     for datum in task.files[0].data:
         if datum.name == "xhome" and datum.value is not None:
-            value = task.value(datum.value, datum.row, here)
+            value = task.value(datum.value, here.at(datum.row))
             if isinstance(value, KnownRecord):
                 found = tuple(value.number(axis) for axis in AXES)
                 return () if np.isnan(found).any() else found

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,21 +14,9 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
-from postproc.language.krl.abstract_state import (
-    CORRECTIONS,
-    NOTHING_SET,
-    PERHAPS,
-    KrlStore,
-    entry_name,
-)
-from postproc.language.krl.pose_encoding import (
-    COMPONENTS,
-    KRL_DIALECT,
-    abc_from_rotation,
-)
+from postproc.language.krl import abstract_state, pose_encoding
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
-from postproc.robot.pose import MM
 
 
 @dataclass(frozen=True)
@@ -75,17 +63,16 @@ class FrameReader:
 
     Attributes:
         task: The files of the job.
-        row, here: The statement.
+        here: The statement.
         tool, base: What ``$TOOL`` and ``$BASE`` are there.
         store: What the program has set before.
     """
 
     task: KrlTask
-    row: int
     here: Scope
     tool: KrlFrame
     base: KrlFrame
-    store: KrlStore = NOTHING_SET
+    store: Mapping[str, object] = field(default_factory=dict)
 
     def frame(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame."""
@@ -100,7 +87,7 @@ class FrameReader:
                 name="tool_data" | "base_data" as table,
                 steps=(ir.ElementStep() as step,),
             ):
-                number = self.task.index(step, self.row, self.here)
+                number = self.task.index(step, self.here)
                 if number is None or len(number) != 1:
                     return no_frame(_WHICH.format(table.upper()))
                 return self.entry(table, number[0])
@@ -114,20 +101,16 @@ class FrameReader:
     def _call(self, name: str, arguments: Sequence[ir.Operand | None]) -> KrlFrame:
         """Read a frame that one of the functions of modern inline forms gives."""
         first = arguments[0] if arguments else None
-        value = self.task.value(first, self.row, self.here)
+        value = self.task.value(first, self.here)
         match name:
             case "stool2" if isinstance(value, KnownRecord):
                 found = self.read_numbered("$tool", value.number("tool_no"))
                 still = value.get("ipo_frame") != "#base"
                 return replace(found, remote=still) if still else found
             case "stool":
-                return self.read_numbered(
-                    "$tool", self.task.number(first, self.row, self.here)
-                )
+                return self.read_numbered("$tool", self.task.number(first, self.here))
             case "sbase":
-                return self.read_numbered(
-                    "$base", self.task.number(first, self.row, self.here)
-                )
+                return self.read_numbered("$base", self.task.number(first, self.here))
             case "ek" | "lk" | "ey" | "eb" | "eb_abs":
                 return no_frame(_CHAINED.format(name.upper()), Code.EXTERNAL_AXES)
         return no_frame(f"what {name.upper()} gives is not known")
@@ -140,7 +123,9 @@ class FrameReader:
         if not self.task.is_global(table, self.here):
             return no_frame(_DOUBLE.format(table.upper()))
         found = ZERO if entry <= 0 else self.entry(table, entry)
-        first, second = (self._correction(name, *pair) for pair in CORRECTIONS[name])
+        first, second = (
+            self._correction(name, *pair) for pair in abstract_state.CORRECTIONS[name]
+        )
         return self._product(self._product(first, found), second)
 
     def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
@@ -149,7 +134,7 @@ class FrameReader:
         if on is None:
             on = self.task.initial_switch(switch)
         found = self._read_held(frame, frame)
-        if on is False or (on == PERHAPS and found == ZERO):
+        if on is False or (on == abstract_state.PERHAPS and found == ZERO):
             return ZERO
         shown = name.upper()
         if on is not True:
@@ -171,7 +156,7 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        held = self._read_held(table, entry_name(table, number))
+        held = self._read_held(table, abstract_state.entry_name(table, number))
         if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):
@@ -180,8 +165,8 @@ class FrameReader:
         if found is None or found[1].value is None:
             return None
         file, datum = found
-        there = Scope(file, self.task.files[file].name, "")
-        pose = pose_of(self.task.value(datum.value, datum.row, there))
+        there = Scope(file, self.task.files[file].name, "", row=datum.row)
+        pose = pose_of(self.task.value(datum.value, there))
         taught = self.task.is_taught(table, file, datum.row)
         return KrlFrame(pose, taught=taught) if pose else None
 
@@ -197,8 +182,8 @@ class FrameReader:
         if found is None:
             return False
         file, datum = found
-        there = Scope(file, self.task.files[file].name, "")
-        value = self.task.value(datum.value, datum.row, there)
+        there = Scope(file, self.task.files[file].name, "", row=datum.row)
+        value = self.task.value(datum.value, there)
         known = (
             value.number("mach_def_index") if isinstance(value, KnownRecord) else 1.0
         )
@@ -211,7 +196,7 @@ class FrameReader:
 
     def _record(self, operand: ir.Operand) -> KrlFrame:
         """Read a frame that is written or named."""
-        value = self.task.value(operand, self.row, self.here)
+        value = self.task.value(operand, self.here)
         pose = pose_of(value)
         if pose and isinstance(operand, ir.DataObject):
             taught, found = False, self.task.datum(operand.name, self.here)
@@ -219,7 +204,7 @@ class FrameReader:
                 taught = self.task.is_taught(operand.name, found[0], found[1].row)
             return KrlFrame(pose, taught=taught)
         if pose:
-            taught = self.task.is_taught("", self.here.file, self.row)
+            taught = self.task.is_taught("", self.here.file, self.here.row)
             return KrlFrame(pose, taught=taught)
         if isinstance(operand, ir.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
@@ -242,17 +227,15 @@ def pose_of(value: object) -> Pose:
     """Convert the components of a frame, empty where it is none."""
     if not isinstance(value, KnownRecord):
         return ()
-    numbers = [value.number(name) for name in COMPONENTS[:6]]
+    numbers = [value.number(name) for name in pose_encoding.COMPONENTS[:6]]
     if any(map(math.isnan, numbers)):
         return ()
-    return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))
+    return flat(pose_encoding.KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))
 
 
 def six_numbers(frame: KrlFrame) -> list[float]:
     """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
-    pose = np.array(frame.pose).reshape(4, 4)
-    angles = abc_from_rotation(pose[None, :3, :3], np.zeros((1, 3)))[0]
-    return [*(pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist()]
+    return pose_encoding.numbers_of(np.array(frame.pose).reshape(4, 4))
 
 
 UPRIGHT = 1e-6  # cosine of B up to which A and C are not told apart
@@ -272,12 +255,12 @@ def set_component(
     if isinstance(held, KrlFrame) and held.pose:
         numbers = six_numbers(held)
         upright = abs(math.cos(math.radians(numbers[4]))) < UPRIGHT
-        known = zip(COMPONENTS[:6], numbers, strict=True)
+        known = zip(pose_encoding.COMPONENTS[:6], numbers, strict=True)
         fields = {} if upright else {key: WrittenNumber(one) for key, one in known}
     elif isinstance(held, KnownRecord):
         fields = dict(held.fields)
     fields.pop(name, None)
-    if name not in COMPONENTS[:6]:
+    if name not in pose_encoding.COMPONENTS[:6]:
         return None
     if not math.isnan(value):
         fields[name] = WrittenNumber(value)

@@ -9,14 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from postproc.arrays import Floats
-from postproc.language import ir
-from postproc.language.insert_moves import (
-    PASSED_MM,
-    MoveLayout,
-    Splitter,
-    spell,
-    split_arguments,
-)
+from postproc.language import insert_moves, ir
 from postproc.language.krl import syntax as said
 from postproc.language.krl.clones import is_of_form
 from postproc.language.krl.modal_state import PLANNED
@@ -36,7 +29,7 @@ _Row = tuple[int, int]  # a file, and a statement of it
 
 
 @dataclass(frozen=True)
-class KrlSplitter(Splitter):
+class KrlSplitter(insert_moves.Splitter):
     """The files of a job, to put points on the ways of moves.
 
     Attributes:
@@ -137,7 +130,10 @@ class KrlSplitter(Splitter):
         with_ = _WITH.search(code, head.end(), stop)
         behind = with_.start() if with_ else stop
         skip = head.end()
-        ends = [Span(a + skip, b + skip) for a, b in split_arguments(code[skip:behind])]
+        ends = [
+            Span(a + skip, b + skip)
+            for a, b in insert_moves.split_arguments(code[skip:behind])
+        ]
         settings = code[with_.end() : stop].strip() if with_ else ""
         indent, word = code[: head.start(1)], head[1].lower()
         return KrlLayout(source, start, code, indent, ";", word, ends[0], settings)
@@ -154,7 +150,7 @@ def _is_setting(one: ir.SourceStatement) -> bool:
 
 
 @dataclass(frozen=True)
-class KrlLayout(MoveLayout):
+class KrlLayout(insert_moves.MoveLayout):
     """How a move is laid out, see `MoveLayout`.
 
     Attributes:
@@ -176,7 +172,7 @@ class KrlLayout(MoveLayout):
 
     def place(self, numbers: Floats, config: str) -> str:
         """Write a position, its numbers (8,); lines and arcs ignore S and T."""
-        told = spell(numbers[:6], KRL_DIALECT.pose_decimals[:6])
+        told = insert_moves.spell(numbers[:6], KRL_DIALECT.pose_decimals[:6])
         named = zip(COMPONENTS, told, strict=False)
         return f"{{{','.join(f'{name.upper()} {x}' for name, x in named)}}}"
 
@@ -187,7 +183,7 @@ class KrlLayout(MoveLayout):
         spline = self.word.startswith("s")
         settings = self.settings
         if spline and not stops and "$APO" not in settings.upper():
-            zone = f"$APO.CDIS={PASSED_MM}"
+            zone = f"$APO.CDIS={insert_moves.PASSED_MM}"
             settings = f"{settings},{zone}" if settings else zone
         with_ = f" WITH {settings}" if settings else ""
         blending = "" if stops else " C_SPL" if spline else " C_DIS"

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Scope
-from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.symbols import whole
@@ -21,10 +21,10 @@ from postproc.language.analysis.task_machine import (
     Arrived,
     Effects,
     TaskMachine,
+    scope_at,
 )
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import HELD
-from postproc.language.krl.external_routines import AHEAD, ASSUMED, package_routines
 from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modal_state import (
     HALTING,
@@ -35,10 +35,13 @@ from postproc.language.krl.modal_state import (
 )
 from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
 from postproc.language.krl.symbols import (
+    AHEAD,
+    ASSUMED,
     FUNCTIONS,
     STILL,
     KrlTask,
     list_calls,
+    package_routines,
     values_of,
 )
 from postproc.language.language import Start
@@ -117,12 +120,11 @@ class KrlMachine(TaskMachine):
         first = self.task.files[0]
         here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
-        self.call_routine(main, self.root, -1, here)
+        self.call_routine(main, None, here)
         self.follow()
         for name, (file, row) in self._assumed.items():
-            self.say(
-                file, row, Code.ROUTINE_ASSUMED_MOTIONLESS, f"{name.upper()} {ASSUMED}"
-            )
+            place, text = Scope(file, "", "", row=row), f"{name.upper()} {ASSUMED}"
+            self.say(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
 
     # What a statement is.
 
@@ -141,21 +143,21 @@ class KrlMachine(TaskMachine):
         blocks = file.splines
         return {row for rows in blocks for row in rows}
 
-    def counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
+    def counts_alone(self, at: At, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
 
         A variable that is not the routine's own may be changed by routines that the
         loop calls, and by what runs beside it.
         """
-        key = context.place.scope.file, row
+        key = at.place.scope.file, at.row
         if key not in self._alone:
-            self._alone[key] = self._counts_alone(context, row, one)
+            self._alone[key] = self._counts_alone(at, one)
         return self._alone[key]
 
-    def _counts_alone(self, context: Context, row: int, one: ir.ForLoop) -> bool:
+    def _counts_alone(self, at: At, one: ir.ForLoop) -> bool:
         """Read a loop once for `counts_alone`."""
-        rows = range(row + 1, context.place.flow.loops.get(row, row))
-        text = self.texts[context.place.scope.file]
+        rows = range(at.row + 1, at.place.flow.loops.get(at.row, at.row))
+        text = self.texts[at.place.scope.file]
         inside = [text.statement(k) for k in rows]
         changed = {
             data.name for other in inside for data in self.task.list_changes(other)
@@ -165,7 +167,7 @@ class KrlMachine(TaskMachine):
             return False
         if one.name in self.task.odd_words:
             return False
-        scope = context.place.scope
+        scope = at.place.scope
         place = self.task.place(one.name, scope)
         if place and place[1:3] == (scope.module, scope.routine):
             return True
@@ -186,104 +188,96 @@ class KrlMachine(TaskMachine):
     # What it does.
 
     def carry_out(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Carry a statement out; None where it goes on in a routine.
 
         Behind ON_ERROR_PROCEED an error skips it: both ways go on then.
         """
         if not here.modes.perhaps:
-            return self._run_once(context, row, one, here)
+            return self._run_once(at, one, here)
         here = replace(here, modes=here.modes.with_(perhaps=False))
-        after = self._run_once(context, row, one, here)
+        after = self._run_once(at, one, here)
         if after is None:
-            self.go_on(context, row + 1, here)
+            self.go_on(at.behind, here)
             return None
         return after.join(here)
 
     def _run_once(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Carry a statement out without an error."""
-        here = self.after_functions(context, row, one, here)
-        here = self._forget(context, row, one, here)
+        here = self.after_functions(at, one, here)
+        here = self._forget(at, one, here)
         match one:
             case said.KrlMove():
-                here = self.arrive(context, row, one, here)
+                here = self.arrive(at, one, here)
                 modes = replace(here.modes, halted=False, goes_on=False)
                 return replace(here, modes=modes)
             case ir.Assignment():
-                return self._assign(context, row, one, here)
+                return self._assign(at, one, here)
             case ir.Instruction():
-                return self._call(context, row, one, here)
+                return self._call(at, one, here)
             case said.Waiting():
                 return _halt(here, True)
             case said.ContinueWord():
                 return replace(here, modes=replace(here.modes, goes_on=True))
             case said.InterruptDeclared():
-                return self._declare(context, row, one, here)
+                return self._declare(at, one, here)
             case said.InterruptSwitched():
-                return self._switch(context, row, one, _halt(here, None))
+                return self._switch(at, one, _halt(here, None))
             case said.PathTrigger():
-                return self._trigger(context, one, here)
+                return self._trigger(at, one, here)
             case _:
                 return here
 
-    def _forget(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
-    ) -> Arrived:
+    def _forget(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Forget what a routine may change of what is handed over to it."""
         if isinstance(one, said.InterruptDeclared | said.PathTrigger):
             return here
         own = one.target if isinstance(one, ir.Assignment) else None
-        store = here.modes.store
+        modes = here.modes
         for target in self.task.list_changes(one):
             name = target.name
             if target is own or not _is_modal(name):
                 continue
             if name not in HELD:
                 what = f"hands {name.upper()} over, which may be changed"
-                return self.unknown(context, row, here, what)
-            store = store.without(name).with_(name, None)
-        if store == here.modes.store:
-            return here
-        return replace(here, modes=here.modes.with_(store=store))
+                return self.unknown(at, here, what)
+            modes = modes.drop(name)
+        return here if modes is here.modes else replace(here, modes=modes)
 
-    def _modes(self, context: Context, row: int) -> ModeReader:
-        return ModeReader(self.task, row, context.place.scope)
+    def _modes(self, at: At) -> ModeReader:
+        return ModeReader(self.task, scope_at(at))
 
-    def _assign(
-        self, context: Context, row: int, one: ir.Assignment, here: Arrived
-    ) -> Arrived:
+    def _assign(self, at: At, one: ir.Assignment, here: Arrived) -> Arrived:
         """Give a value to data, or change how moves are made."""
         name = one.target.name
         if name.startswith("$") and name not in PLANNED:
             here = _halt(here, True if name in HALTING else None)
-        modes = self._modes(context, row).assign(here.modes, one)
+        modes = self._modes(at).assign(here.modes, one)
         if modes is None:
             what = (
                 f"sets {name.upper()}: what that does to moves is not known. Take it "
                 "out if it is not needed"
             )
-            return self.unknown(context, row, here, what)
+            return self.unknown(at, here, what)
         value = one.value
         if isinstance(value, ir.FunctionCall) and value.name in ("eb", "eb_abs"):
             # The base follows a conveyor, which takes the arm along.
             here = replace(here, origins=NOWHERE)
-        here = self.assign_point(context, row, one, here)
+        here = self.assign_point(at, one, here)
         return replace(here, modes=modes)
 
-    def _call(
-        self, context: Context, row: int, one: ir.Instruction, here: Arrived
-    ) -> Arrived | None:
+    def _call(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived | None:
         name = one.name
         if name in self.task.routines:
-            return self.call_named(context, row, name, here)
+            return self.call_named(at, name, here)
         if name == "bas":
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
                 here = _halt(here, None)  # outputs are switched, which may stop the arm
-            modes = self._modes(context, row).bas(here.modes, one.arguments)
+            modes = self._modes(at).bas(here.modes, one.arguments)
             return replace(here, modes=modes)
         if name == "pulse":
             return _halt(here, True)
@@ -294,22 +288,22 @@ class KrlMachine(TaskMachine):
         if name in package_routines() and not self._is_overruled(name):
             if package_routines()[name] == AHEAD:
                 return here
-            place = context.place.scope.file, row
+            place = at.place.scope.file, at.row
             self._assumed[name] = min(self._assumed.get(name, place), place)
             return _halt(here, None)
-        return self.outside(context, row, name, here)
+        return self.outside(at, name, here)
 
     def _is_overruled(self, name: str) -> bool:
         """Return True if the cell says what a routine of a package does."""
         return self.start.assume_motion or name in self.start.routines
 
     def after_functions(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
         for part in values_of(one):
             if isinstance(part, ir.FunctionCall):
-                here = self._function(context, row, part.name, here)
+                here = self._function(at, part.name, here)
             elif isinstance(part, ir.DataObject) and part.name.startswith("$"):
                 given = isinstance(one, ir.Assignment) and part is one.target
                 known = part.name in PLANNED or isinstance(one, said.KrlMove)
@@ -318,28 +312,21 @@ class KrlMachine(TaskMachine):
                 here = _halt(here, True if part.name in HALTING else None)
         return here
 
-    def _function(
-        self, context: Context, row: int, name: str, here: Arrived
-    ) -> Arrived:
+    def _function(self, at: At, name: str, here: Arrived) -> Arrived:
         """Allow for what a function does."""
         still = name in FUNCTIONS or name in STILL or self.declares_motionless(name)
-        after = self.call_function(context, row, name, still, here)
+        after = self.call_function(at, name, still, here)
         own = name in self.task.routines
         return _halt(here, None) if own and after is here else after
 
     # Interrupts and triggers.
 
-    def _declare(
-        self, context: Context, row: int, one: said.InterruptDeclared, here: Arrived
-    ) -> Arrived:
+    def _declare(self, at: At, one: said.InterruptDeclared, here: Arrived) -> Arrived:
         """Declare an interrupt; one that nothing switches on may be on already."""
-        self._met.add((context.place.scope.file, row))
-        effects = self.effects_of(one.action, context.place.scope)
-        self._call_beside(context.place.scope.file, one.action)
-        modes, number = (
-            here.modes,
-            self._number_of(context.place.scope, row, one.number),
-        )
+        self._met.add((at.place.scope.file, at.row))
+        effects = self.effects_of(one.action, at.place.scope)
+        self._call_beside(one.action)
+        modes, number = here.modes, self._number_of(scope_at(at), one.number)
         others = frozenset(d for d in modes.declared if d[0] != number)
         modes = replace(modes, declared=others)
         ends = RESUMES in effects
@@ -379,7 +366,7 @@ class KrlMachine(TaskMachine):
             for row in text.where(lambda one: isinstance(one, kinds)):
                 one, around = text.statement(row), self.task.routine_around(file, row)
                 word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
-                number = self._number_of(here, row, one.number)
+                number = self._number_of(here.at(row), one.number)
                 routine = around.key if around else (file, -1)
                 found.append(_InterruptStatement(file, row, routine, word, number, one))
         return found
@@ -398,8 +385,8 @@ class KrlMachine(TaskMachine):
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         if not ending:
             return here
-        scope, numbers = context.place.scope, {number for number, _ in ending}
-        at = TaskRoutine(scope.file, scope.module, context.place.routine)
+        place, numbers = context.place, {number for number, _ in ending}
+        at = TaskRoutine(place.scope.file, place.scope.module, place.routine)
         switching = self._find_routines(("on", "off"), numbers | {EVERY})
         switches = any(one.key in switching for one in self.reach_from([at]))
         if not (ending & here.modes.active or switches):
@@ -426,20 +413,15 @@ class KrlMachine(TaskMachine):
             one = self.texts[found.file].statement(row)
             if isinstance(one, said.InterruptSwitched) and one.word == "off":
                 there = Scope(found.file, found.module, "")
-                own = self._number_of(there, row, one.number)
+                own = self._number_of(there.at(row), one.number)
                 return one.number is None or own == declared.number
             if not isinstance(one, ir.Declaration):
                 return False
         return False
 
-    def _switch(
-        self, context: Context, row: int, one: said.InterruptSwitched, here: Arrived
-    ) -> Arrived:
-        self._met.add((context.place.scope.file, row))
-        modes, number = (
-            here.modes,
-            self._number_of(context.place.scope, row, one.number),
-        )
+    def _switch(self, at: At, one: said.InterruptSwitched, here: Arrived) -> Arrived:
+        self._met.add((at.place.scope.file, at.row))
+        modes, number = here.modes, self._number_of(scope_at(at), one.number)
         if one.word == "on":
             meant = {
                 d for d in modes.declared if EVERY in (number, d[0]) or d[0] == number
@@ -479,47 +461,45 @@ class KrlMachine(TaskMachine):
                 found[k] = found.get(k, frozenset()) | {why}
         return found
 
-    def _number_of(self, here: Scope, row: int, operand: ir.Operand | None) -> int:
+    def _number_of(self, here: Scope, operand: ir.Operand | None) -> int:
         """Return the number of an interrupt, EVERY where it is not known."""
-        number = whole(self.task.number(operand, row, here))
+        number = whole(self.task.number(operand, here))
         return EVERY if number is None else number
 
-    def _trigger(
-        self, context: Context, one: said.PathTrigger, here: Arrived
-    ) -> Arrived:
+    def _trigger(self, at: At, one: said.PathTrigger, here: Arrived) -> Arrived:
         """Leave what comes behind a trigger that may set what moves need.
 
         What it does comes at some time in the next move, when the program is ahead.
         """
-        if not self.effects_of(one.action, context.place.scope):
+        if not self.effects_of(one.action, at.place.scope):
             return here
-        self._call_beside(context.place.scope.file, one.action)
+        self._call_beside(one.action)
         return replace(
             here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
         )
 
-    def _call_beside(self, file: int, action: ir.SourceStatement) -> None:
+    def _call_beside(self, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
-        for at, _, called in self.calls_of(file, action):
-            self.run_beside(at, called)
+        for called in self.calls_of(action):
+            self.run_beside(called)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+    def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return what an interrupt calls later, too."""
         if isinstance(one, said.InterruptDeclared):
             one = one.action
-        return super().calls_of(file, one)
+        return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement says what is done at another time."""
         return isinstance(one, said.InterruptDeclared | said.PathTrigger)
 
     def read_visits(
-        self, one: Any, row: int, scope: Scope, here: Arrived | None
+        self, one: Any, scope: Scope, here: Arrived | None
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move, see `TaskMachine.read_visits`."""
         if isinstance(one, said.KrlMove):
             modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
-            yield from self.goals.visits(one, row, scope, modes, points)
+            yield from self.goals.visits(one, scope, modes, points)
 
     @cached_property
     def everywhere(self) -> frozenset[Reason]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
-from postproc.language import ir
+from postproc.language import ir, language
 from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
 from postproc.language.insert_moves import Splitter
@@ -20,18 +20,9 @@ from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.symbols import KrlTask
-from postproc.language.krl.to_visits import visits_of
+from postproc.language.krl.to_visits import KrlCollector
 from postproc.language.krl.user_sources import acting_sources
-from postproc.language.language import (
-    Archive,
-    Cloner,
-    JobReading,
-    Start,
-)
-from postproc.language.measuring_program import (
-    MeasuringProgram,
-    refuse_other_name,
-)
+from postproc.language.measuring_program import MeasuringProgram, refuse_other_name
 from postproc.language.text.blocks import read_once
 from postproc.language.text.source import Source
 
@@ -71,9 +62,9 @@ class Krl(TaskLanguage):
     def read(
         self,
         sources: Sequence[Source],
-        start: Start,
+        start: language.Start,
         known: Sequence[KrlFile] = (),
-    ) -> JobReading:
+    ) -> language.JobReading:
         """Read the files of a job, the source that runs first; see `Language.read`."""
         files = [read_once(source, known, read_krl) for source in sources]
         if files[0].is_submit:
@@ -84,12 +75,12 @@ class Krl(TaskLanguage):
         _refuse_doubles(files)
         task = KrlTask(files, start.taught)
         machine = follow(lambda: KrlMachine.of(task, start))
-        visits = visits_of(machine)
+        visits = KrlCollector(machine).collect()
         odd = (d for file in files for d in file.diagnostics)
         main = f"DEF {files[0].routines[0].head.name}", "program"
         return self.report(machine, visits, files, odd, main)
 
-    def cloner(self, sources: Sequence[Source]) -> Cloner:
+    def cloner(self, sources: Sequence[Source]) -> language.Cloner:
         """Parse the files of a job to clone points of its data lists."""
         return KrlCloner(KrlTask([read_krl(source) for source in sources]))
 
@@ -111,7 +102,7 @@ class Krl(TaskLanguage):
             return ()
         return (*named.find_shared(within, listing), *acting_sources(program))
 
-    def read_archive(self, folder: Path) -> Archive | None:
+    def read_archive(self, folder: Path) -> language.Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
         return read_archive(folder)
 

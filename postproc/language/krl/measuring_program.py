@@ -4,21 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from postproc.language.krl.pose_encoding import abc_from_rotation
+from postproc.language import measuring_program
+from postproc.language.krl.pose_encoding import numbers_of
 from postproc.language.krl.symbols import AXES
-from postproc.language.measuring_program import (
-    CORNER_MM,
-    GENTLY,
-    SHARE,
-    SLOW,
-    MeasuringLine,
-    MeasuringProgram,
-    MeasuringStep,
-    MountedProbe,
-)
-from postproc.robot.pose import MM
 
 # What the inline form INI of every program says, then speed and acceleration.
 _INI = (
@@ -27,18 +15,18 @@ _INI = (
     "INTERRUPT ON 3",
     "BAS (#INITMOV,0 )",
     ";ENDFOLD (INI)",
-    f"BAS (#VEL_PTP,{SHARE} )",
-    f"BAS (#ACC_PTP,{GENTLY} )",
+    f"BAS (#VEL_PTP,{measuring_program.SHARE} )",
+    f"BAS (#ACC_PTP,{measuring_program.GENTLY} )",
 )
 # Lines are in the world, so fast, and leave for the next one so near their end.
 _LINES = (
     "$BASE=$NULLFRAME",
-    f"$VEL.CP={SLOW / 1000:g}",
-    f"$APO.CDIS={CORNER_MM}",
+    f"$VEL.CP={measuring_program.SLOW / 1000:g}",
+    f"$APO.CDIS={measuring_program.CORNER_MM}",
 )
 
 
-def write_krl(program: MeasuringProgram) -> str:
+def write_krl(program: measuring_program.MeasuringProgram) -> str:
     """Write a source: its points stand in the moves, so it needs no data list."""
     lines = [
         "&ACCESS RVP",
@@ -54,7 +42,7 @@ def write_krl(program: MeasuringProgram) -> str:
     return "\r\n".join([*lines, "END", ""])
 
 
-def _write_load(program: MeasuringProgram) -> Iterator[str]:
+def _write_load(program: measuring_program.MeasuringProgram) -> Iterator[str]:
     """Write the load that the arm carries, nothing where it is not known."""
     if program.mass_kg > 0.0:
         centre = _frame(program.centre_mm)
@@ -67,12 +55,14 @@ def _frame(xyz_mm: tuple[float, ...]) -> str:
     return f"{{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.0,B 0.0,C 0.0}}"
 
 
-def _write_step(step: MeasuringStep, program: MeasuringProgram) -> Iterator[str]:
-    if isinstance(step, MountedProbe):
+def _write_step(
+    step: measuring_program.MeasuringStep, program: measuring_program.MeasuringProgram
+) -> Iterator[str]:
+    if isinstance(step, measuring_program.MountedProbe):
         yield f"; probe point {step.number}"
         yield f"$TOOL={_frame(step.xyz_mm)}"
         return
-    if isinstance(step, MeasuringLine):
+    if isinstance(step, measuring_program.MeasuringLine):
         yield f"LIN {_write_pose(step)}{' C_DIS' if step.flown else ''}"
         return
     if step.measured:
@@ -83,9 +73,7 @@ def _write_step(step: MeasuringStep, program: MeasuringProgram) -> Iterator[str]
         yield f"WAIT SEC {program.settle_s:.1f}"
 
 
-def _write_pose(line: MeasuringLine) -> str:
+def _write_pose(line: measuring_program.MeasuringLine) -> str:
     """Write the end of a line as a frame, which keeps the configuration."""
-    angles = abc_from_rotation(line.pose[None, :3, :3], np.zeros((1, 3)))[0]
-    numbers = (*(line.pose[:3, 3] / MM).tolist(), *np.rad2deg(angles).tolist())
-    named = zip("XYZABC", numbers, strict=True)
+    named = zip("XYZABC", numbers_of(line.pose), strict=True)
     return f"{{{','.join(f'{name} {v:.5f}' for name, v in named)}}}"

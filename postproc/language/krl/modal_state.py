@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -14,16 +14,8 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.modal_state import ModalState
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value
+from postproc.language.krl import abstract_state
 from postproc.language.krl import syntax as said
-from postproc.language.krl.abstract_state import (
-    CORRECTION_FRAMES,
-    NOTHING_SET,
-    PERHAPS,
-    SWITCHES,
-    TABLES,
-    KrlStore,
-    entry_name,
-)
 from postproc.language.krl.frames import (
     NUMBERS,
     ZERO,
@@ -41,7 +33,7 @@ CELL_LOAD: tuple[float, ...] = ()
 LOST_LOAD: tuple[float, ...] = (-1.0,)
 LOST_FRAME = no_frame(
     "$TOOL and $BASE are not known here: set them after the statement that is not "
-    "followed, or in every branch that leads here",
+    "followed, or in every branch that leads here"
 )
 
 
@@ -92,7 +84,7 @@ class KrlModes(ModalState):
     halted: bool | None = False
     goes_on: bool = False
     load: tuple[float, ...] = CELL_LOAD
-    store: KrlStore = NOTHING_SET
+    store: Mapping[str, object] = field(default_factory=dict)
     perhaps: bool = False
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
@@ -103,7 +95,19 @@ class KrlModes(ModalState):
 
     def join(self, other: KrlModes) -> KrlModes:
         """Keep what is the same on another way here."""
-        return replace(super().join(other), store=self.store.join(other.store))
+        both = {k: v for k, v in self.store.items() if other.store.get(k) == v}
+        return replace(super().join(other), store=both)
+
+    def hold(self, name: str, value: object | None) -> KrlModes:
+        """Return it with what the program sets a name to; None forgets it."""
+        store = {k: v for k, v in self.store.items() if k != name}
+        return replace(self, store=store if value is None else store | {name: value})
+
+    def drop(self, name: str) -> KrlModes:
+        """Forget what the program has set a name, or any entry of a table, to."""
+        lost = [k for k in self.store if k.partition("[")[0] == name]
+        kept = {k: v for k, v in self.store.items() if k not in lost}
+        return replace(self, store=kept) if lost else self
 
     def beside(self, task: KrlTask) -> KrlModes:
         """Return it where submit programs may change what they set at any time."""
@@ -134,8 +138,8 @@ _LAWS = {
 }
 _BOOLS = ("true", "false")
 _SWITCHED_OFF: Sequence[tuple[str, object]] = (
-    *((name, False) for name in sorted(SWITCHES)),
-    *((name, ZERO) for name in sorted(CORRECTION_FRAMES)),
+    *((name, False) for name in sorted(abstract_state.SWITCHES)),
+    *((name, ZERO) for name in sorted(abstract_state.CORRECTION_FRAMES)),
 )
 _KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
@@ -155,6 +159,18 @@ IGNORED = Reason(
     Code.EXTERNAL_AXES, "the track need not go where targets say ($EX_AX_IGNORE)"
 )
 MOVED_BASE = Reason(Code.SETTING_UNTRACKED, "$ROBROOT or $WORLD is set by the program")
+_BLOCKING = {
+    "$soft_plcl": SOFT, "$softn": SOFT, "$tech": GENERATOR, "$tech_c": GENERATOR,
+    "$load_a1": AXIS_LOAD, "$load_a2": AXIS_LOAD, "$load_a3": AXIS_LOAD,
+    "$robroot": MOVED_BASE, "$world": MOVED_BASE,
+}  # fmt: skip
+"""Variables behind whose assignment no target can be compensated, and why."""
+_WORDS = {
+    "$ipo_mode": ("interpolation", "ipo_frame"),
+    "$ori_type": ("orientation", "ori_typ"),
+    "$circ_type": ("circle", "circ_typ"),
+}
+"""Variables that are set to words: modes, and components of data with such a word."""
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
 PLANNED = frozenset(
@@ -240,11 +256,10 @@ class ModeReader:
 
     Attributes:
         task: The files of the job.
-        row, here: Where the statement stands.
+        here: Where the statement stands.
     """
 
     task: KrlTask
-    row: int
     here: Scope
 
     def assign(self, modes: KrlModes, one: ir.Assignment) -> KrlModes | None:
@@ -263,12 +278,11 @@ class ModeReader:
         match name:
             case "$tool" | "$base":
                 return self._frame(modes, one)
-            case "$ipo_mode":
-                return replace(modes, interpolation=self._word(value, "ipo_frame"))
-            case "$ori_type":
-                return replace(modes, orientation=self._word(value, "ori_typ"))
-            case "$circ_type":
-                return replace(modes, circle=self._word(value, "circ_typ"))
+            case _ if name in _WORDS:
+                field_, component = _WORDS[name]
+                return modes.with_(**{field_: self._word(value, component)})
+            case _ if name in _BLOCKING:
+                return modes.with_(blocked=modes.blocked | {_BLOCKING[name]})
             case "$circ_mode":
                 return replace(modes, through=self._goes_through(one))
             case "$vel" | "$vel_axis" | "$apo":
@@ -279,24 +293,16 @@ class ModeReader:
                 return replace(modes, ahead=ahead)
             case "$load":
                 return self._load(modes, one)
-            case "$soft_plcl" | "$softn":
-                return replace(modes, blocked=modes.blocked | {SOFT})
-            case "$tech" | "$tech_c":
-                return replace(modes, blocked=modes.blocked | {GENERATOR})
-            case "$load_a1" | "$load_a2" | "$load_a3":
-                return replace(modes, blocked=modes.blocked | {AXIS_LOAD})
             case "$ex_ax_ignore":
                 off = self._number(value) == 0.0
                 rest = modes.blocked - {IGNORED}
                 return replace(modes, blocked=rest if off else rest | {IGNORED})
-            case "$robroot" | "$world":
-                return replace(modes, blocked=modes.blocked | {MOVED_BASE})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._hold_component(modes, one)
-            case _ if name in TABLES:
-                return replace(modes, store=self._entry(modes, one))
-            case _ if name in CORRECTION_FRAMES | SWITCHES:
-                return replace(modes, store=self._correction(modes, one))
+            case _ if name in abstract_state.TABLES:
+                return self._entry(modes, one)
+            case _ if name in abstract_state.HELD:
+                return self._correction(modes, one)
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
 
@@ -314,29 +320,26 @@ class ModeReader:
 
     def frames(self, modes: KrlModes) -> FrameReader:
         """Return what reads frames here."""
-        return FrameReader(
-            self.task, self.row, self.here, modes.tool, modes.base, modes.store
-        )
+        return FrameReader(self.task, self.here, modes.tool, modes.base, modes.store)
 
-    def _entry(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
+    def _entry(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``BASE_DATA[20] = {..}``: known where the entry and all of it are known."""
-        table, store = one.target.name, modes.store
-        index = None
+        table, index = one.target.name, None
         if one.target.steps:
-            index = self.task.index(one.target.steps[0], self.row, self.here)
+            index = self.task.index(one.target.steps[0], self.here)
         if index is None or len(index) != 1:
-            return store.without(table)
-        key, parts = entry_name(table, index[0]), one.target.steps[1:]
+            return modes.drop(table)
+        key, parts = abstract_state.entry_name(table, index[0]), one.target.steps[1:]
         value: object | None = None
         if not self.task.is_global(table, self.here):
-            return store.with_(key, value)
+            return modes.hold(key, value)
         if not parts:
             value = self._entry_value(modes, one)
         elif table != "load_data":
-            value = self._component(store.get(key), parts, one.value)
+            value = self._component(modes.store.get(key), parts, one.value)
         if isinstance(value, KrlFrame) and table in self.task.taught:
             value = replace(value, taught=True)
-        return store.with_(key, value)
+        return modes.hold(key, value)
 
     def _component(
         self, held: object, parts: Sequence[str | ir.ElementStep], value: ir.Operand
@@ -354,16 +357,16 @@ class ModeReader:
         found = self.frames(modes).frame(one.value)
         return None if found.why or not found.pose else found
 
-    def _correction(self, modes: KrlModes, one: ir.Assignment) -> KrlStore:
+    def _correction(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
         name, value = one.target.name, None
         if one.target.steps or not self.task.is_global(name, self.here):
-            return modes.store.with_(name, None)
-        if name in SWITCHES:
+            return modes.hold(name, None)
+        if name in abstract_state.SWITCHES:
             value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
-            return modes.store.with_(name, value)
+            return modes.hold(name, value)
         found = self.frames(modes).frame(one.value)
-        return modes.store.with_(name, None if found.why else found)
+        return modes.hold(name, None if found.why else found)
 
     def _hold_component(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
@@ -371,29 +374,27 @@ class ModeReader:
         own = not self.task.is_global(one.target.name, self.here)
         if one.target.steps or own or one.target.name in self.task.beside:
             return modes.with_(**{name: None})
-        found = self.task.value(one.value, self.row, self.here)
+        found = self.task.value(one.value, self.here)
         return modes.with_(**{name: found})
 
     def _number(self, operand: ir.Operand | None) -> float:
-        return self.task.number(operand, self.row, self.here)
+        return self.task.number(operand, self.here)
 
-    def _argument(self, operand: ir.Operand, at: int = 0) -> ir.Operand | None:
-        """Return an argument of a function, None where it is not there."""
-        if not isinstance(operand, ir.FunctionCall):
-            return None
-        given = operand.arguments
-        return given[at].value if at < len(given) else None
+    def _argument(self, operand: ir.Operand) -> ir.Operand | None:
+        """Return the first argument of a function, None where it is not there."""
+        given = operand.arguments if isinstance(operand, ir.FunctionCall) else ()
+        return given[0].value if given else None
 
     def _record(self, operand: ir.Operand | None) -> KnownRecord:
-        found = self.task.value(operand, self.row, self.here)
+        found = self.task.value(operand, self.here)
         return found if isinstance(found, KnownRecord) else KnownRecord((), whole=False)
 
     def _word(self, operand: ir.Operand, field: str) -> str:
         """Read ``#BASE``, or what ``SIPO_MODE(FP1.IPO_FRAME)`` gives, "" if unknown."""
-        found = self.task.value(operand, self.row, self.here)
+        found = self.task.value(operand, self.here)
         if isinstance(operand, ir.FunctionCall):
             inside = self._argument(operand)
-            found = self.task.value(inside, self.row, self.here)
+            found = self.task.value(inside, self.here)
             if isinstance(found, KnownRecord):
                 found = found.get(field)
         return found.lower() if isinstance(found, str) else ""
@@ -466,7 +467,7 @@ class ModeReader:
             case (), ir.FunctionCall(name="sload"):
                 return self.take_load(modes, self._number(self._argument(operand)))
             case (), ir.DataObject(name="load_data", steps=(ir.ElementStep() as step,)):
-                index = self.task.index(step, self.row, self.here) or (math.nan,)
+                index = self.task.index(step, self.here) or (math.nan,)
                 return self.take_load(modes, index[0])
             case (), _:
                 return replace(modes, load=load_of(self._record(operand)))
@@ -477,7 +478,7 @@ class ModeReader:
         entry = whole(number)
         if entry is None:
             return replace(modes, load=LOST_LOAD)
-        held = modes.store.get(entry_name("load_data", entry))
+        held = modes.store.get(abstract_state.entry_name("load_data", entry))
         if isinstance(held, tuple) and "load_data" not in self.task.beside:
             return replace(modes, load=held)
         if not self.task.is_steady("load_data", entry):
@@ -486,8 +487,8 @@ class ModeReader:
         if entry <= 0 or found is None:
             return replace(modes, load=CELL_LOAD)
         file, datum = found
-        there = Scope(file, self.task.files[file].name, "")
-        value = self.task.value(datum.value, datum.row, there)
+        there = Scope(file, self.task.files[file].name, "", row=datum.row)
+        value = self.task.value(datum.value, there)
         load = load_of(value) if isinstance(value, KnownRecord) else LOST_LOAD
         return replace(modes, load=load)
 
@@ -533,13 +534,10 @@ class ModeReader:
 
         Speeds and distances are those of ``$config.dat``. The load stays what it is.
         """
-        store = modes.store
-        linked = store.get(_KEPT_ON) in (True, PERHAPS)
+        linked = modes.store.get(_KEPT_ON) in (True, abstract_state.PERHAPS)
         for name, value in _SWITCHED_OFF:
-            store = store.with_(name, value)
-        if linked:
-            store = store.with_(_KEPT_ON, PERHAPS)
-        modes = replace(modes, store=store)
+            modes = modes.hold(name, value)
+        modes = modes.hold(_KEPT_ON, abstract_state.PERHAPS) if linked else modes
         reader = self.frames(modes)
 
         def number(name: str) -> float:

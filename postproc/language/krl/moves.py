@@ -12,45 +12,21 @@ import numpy as np
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import (
-    AssignedPoint,
-    Points,
-    Scope,
-)
+from postproc.language.analysis import goals
+from postproc.language.analysis.assigned_points import AssignedPoint, Points, Scope
 from postproc.language.analysis.found_visits import FoundGoal, FoundVisit, not_reached
-from postproc.language.analysis.goals import (
-    AT_RUN_TIME,
-    COMPUTED,
-    RUN_TIME,
-    GoalReader,
-    ReadShift,
-    locate_numbers,
-)
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
+from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
-from postproc.language.krl.pose_encoding import (
-    COMPONENTS,
-    KRL_DIALECT,
-    MEASURED,
-    NOT_WRITTEN,
-    UNKNOWN_STATUS,
-    WIDTH,
-)
-from postproc.language.krl.symbols import (
-    AXES,
-    OUTSIDE,
-    POSITIONS,
-    KrlTask,
-)
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
-NOTHING = (math.nan,) * WIDTH
-NO_SLOTS = (-1,) * WIDTH
-PLACE = COMPONENTS[:6]
+NOTHING = (math.nan,) * pose_encoding.WIDTH
+NO_SLOTS = (-1,) * pose_encoding.WIDTH
+PLACE = pose_encoding.COMPONENTS[:6]
 
 
 def no_target(text: str) -> Reason:
@@ -92,7 +68,8 @@ NOT_BY_JOINTS = Reason(
 )
 ODD_STATUS = Reason(Code.CONFIGURATION_UNKNOWN, "S or T is no valid number")
 ANGLE = Reason(
-    Code.ENDS_ELSEWHERE, f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
+    Code.ENDS_ELSEWHERE,
+    f"CA ends the arc elsewhere than at its end point: {goals.RUN_TIME}",
 )
 
 
@@ -130,69 +107,62 @@ class KrlGoals:
         aux: External axes that the cell declares.
     """
 
-    task: KrlTask
+    task: symbols.KrlTask
     aux: Collection[int] = ()
 
     def visits(
-        self,
-        move: said.KrlMove,
-        row: int,
-        here: Scope,
-        modes: object,
-        points: Points,
+        self, move: said.KrlMove, here: Scope, modes: object, points: Points
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
-        block, given = self.block(row, here), dict[str, Any]()
+        block, given = self.block(here), dict[str, Any]()
         in_joints = False
         if block is not None:
-            move, given = self._in_block(move, row, here, block)
+            move, given = self._in_block(move, here, block)
             begin = self.task.files[here.file].text.statement(block.start)
             in_joints = (
                 isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
             )
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._reader(move, row, here).end(move.to), SPLINE)
-            yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
+            goal = not_reached(self._reader(move, here).end(move.to), SPLINE)
+            yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
             return
-        reader = self._reader(move, row, replace(here, points=points))
-        angle = math.radians(self.task.number(move.angle, row, here))
+        reader = self._reader(move, replace(here, points=points))
+        angle = math.radians(self.task.number(move.angle, here))
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
             goal = reader.end(move.via)
-            yield KrlVisit(
-                here, row, motion, True, goal, modes, why=why, **given, move=move
-            )
+            yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
         goal = reader.end(move.to)
         if why:
             goal = not_reached(goal, ANGLE)
         yield KrlVisit(
-            here, row, motion, False, goal, modes,
+            here, motion, False, goal, modes,
             why=SPLINE if in_joints else NO_REASON,
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
-    def _reader(self, move: said.KrlMove, row: int, here: Scope) -> KrlGoal:
-        within = self.block(row, here) is not None
-        return KrlGoal(self.task, row, here, move, within, self.aux)
+    def _reader(self, move: said.KrlMove, here: Scope) -> KrlGoal:
+        within = self.block(here) is not None
+        return KrlGoal(self.task, here, move, within, self.aux)
 
-    def block(self, row: int, here: Scope) -> range | None:
+    def block(self, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
-        at = bisect_right(blocks, row, key=lambda rows: rows.start) - 1
-        return blocks[at] if at >= 0 and row in blocks[at] else None
+        at = bisect_right(blocks, here.row, key=lambda rows: rows.start) - 1
+        return blocks[at] if at >= 0 and here.row in blocks[at] else None
 
     def _in_block(
-        self, move: said.KrlMove, row: int, here: Scope, rows: range
+        self, move: said.KrlMove, here: Scope, rows: range
     ) -> tuple[said.KrlMove, dict[str, Any]]:
         """Blend the last move of a block as its end says; say what visits share."""
         file = self.task.files[here.file]
-        inner = row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
+        inner = here.row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
         end = file.text.statement(rows.stop)
         if isinstance(end, said.SplineBlock) and not inner:
             move = replace(move, words=(*move.words, *end.words))
-        shared = {"block": (here, rows.start), "begin": rows.start, "inner": inner}
+        shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
         return move, shared
 
 
@@ -223,7 +193,7 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
 
 
 @dataclass(frozen=True)
-class KrlGoal(GoalReader):
+class KrlGoal(goals.GoalReader):
     """Reads the ends of one move.
 
     Attributes:
@@ -232,11 +202,11 @@ class KrlGoal(GoalReader):
         axes: External axes that the cell declares.
     """
 
-    task: KrlTask
+    task: symbols.KrlTask
     move: said.KrlMove
     in_block: bool
     axes: Collection[int] = ()
-    dialect = KRL_DIALECT
+    dialect = pose_encoding.KRL_DIALECT
     brackets = "[]"
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
@@ -253,7 +223,7 @@ class KrlGoal(GoalReader):
             case ir.DataObject(name=name) if name in PRESENT:
                 return self._stay(name)
             case ir.DataObject(name=name) if name in BEFORE:
-                return self.unknown(no_target(RUN_TIME), name)
+                return self.unknown(no_target(goals.RUN_TIME), name)
             case ir.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
             case ir.Operation(operator=":", operands=(first, second)):
@@ -266,7 +236,7 @@ class KrlGoal(GoalReader):
         """Read joint angles or a position."""
         if not isinstance(value, KnownRecord) or not value.whole:
             return None
-        by_axes = {key for key, _ in value.fields} & set(AXES)
+        by_axes = {key for key, _ in value.fields} & set(symbols.AXES)
         goal = self._axes(value) if by_axes else self._pose(value)
         if name and goal.why.code is Code.PARTIAL_TARGET:
             return self.unknown(PARTIAL, name)  # what it lacks may be told elsewhere
@@ -300,19 +270,19 @@ class KrlGoal(GoalReader):
     def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
         """Return True unless an external axis that the cell declares is missing."""
         fields = dict(value.fields) if isinstance(value, KnownRecord) else {}
-        lacks_axis = any(OUTSIDE[axis - 1] not in fields for axis in self.axes)
+        lacks_axis = any(symbols.OUTSIDE[axis - 1] not in fields for axis in self.axes)
         return held.operand is not None or not lacks_axis
 
     def _axes(self, found: KnownRecord) -> FoundGoal:
         """Read six joint angles; only PTP goes to them."""
-        numbers = _numbers(found, AXES)
+        numbers = _numbers(found, symbols.AXES)
         if not self._by_joints:
             return self.unknown(NOT_BY_JOINTS)
         if numbers is None:
-            return self._partial(found, AXES, Meaning.PARTIAL_JOINTS)
-        file, slots = locate_numbers(numbers, WIDTH)
+            return self._partial(found, symbols.AXES, Meaning.PARTIAL_JOINTS)
+        file, slots = goals.locate_numbers(numbers, pose_encoding.WIDTH)
         values = [number.value for number in numbers]
-        why = NO_REASON if file >= 0 else COMPUTED
+        why = NO_REASON if file >= 0 else goals.COMPUTED
         return FoundGoal(
             Meaning.JOINTS, (*values, 0.0, 0.0), file, slots, NO_SLOTS,
             aux=self._outside(found), why=why,
@@ -323,19 +293,19 @@ class KrlGoal(GoalReader):
         numbers = _numbers(found, PLACE)
         if numbers is None:
             return self._partial(found, PLACE[:3], Meaning.PARTIAL_POSE)
-        flags = [found.get(name) for name in COMPONENTS[6:]]
+        flags = [found.get(name) for name in pose_encoding.COMPONENTS[6:]]
         written = [
             f if isinstance(f, WrittenNumber) else WrittenNumber(-1.0) for f in flags
         ]
         values = [one.value for one in (*numbers, *written)]
-        file, slots = locate_numbers(numbers, WIDTH)
+        file, slots = goals.locate_numbers(numbers, pose_encoding.WIDTH)
         own = tuple(one.slot if one.file == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
-        if self._by_joints and NOT_WRITTEN in values[6:]:
+        if self._by_joints and pose_encoding.NOT_WRITTEN in values[6:]:
             return self.unknown(NO_STATUS)
         if self._by_joints and why.code is Code.CONFIGURATION_UNKNOWN:
             return self.unknown(why)
-        why = why or (NO_REASON if file >= 0 else COMPUTED)
+        why = why or (NO_REASON if file >= 0 else goals.COMPUTED)
         return FoundGoal(
             Meaning.POSE, tuple(values), file, (*slots[:6], *own), NO_SLOTS, aux=aux,
             why=why,
@@ -352,23 +322,26 @@ class KrlGoal(GoalReader):
         given = {key for key, _ in found.fields}
         moves_so = (meaning == Meaning.PARTIAL_JOINTS) == self._by_joints
         alone = not self.in_block and self.move.via is None and bool(given & {*names})
-        if not (moves_so and alone and given <= {*names, *OUTSIDE}):
+        if not (moves_so and alone and given <= {*names, *symbols.OUTSIDE}):
             return self.unknown(PARTIAL)
         values = [found.number(name) for name in names]
-        values += [math.nan] * (WIDTH - len(values))
+        values += [math.nan] * (pose_encoding.WIDTH - len(values))
         return FoundGoal(meaning, tuple(values), aux=self._outside(found), why=PARTIAL)
 
     def _status(self, s: float, t: float) -> Reason:
         """Say what speaks against a position's S and T."""
-        if any(f != NOT_WRITTEN and (f < 0 or whole(f) is None) for f in (s, t)):
+        if any(
+            f != pose_encoding.NOT_WRITTEN and (f < 0 or whole(f) is None)
+            for f in (s, t)
+        ):
             return ODD_STATUS
-        if s >= UNKNOWN_STATUS:
+        if s >= pose_encoding.UNKNOWN_STATUS:
             return ODD_STATUS
-        return ACCURATE if s > 0 and int(s) & MEASURED else NO_REASON
+        return ACCURATE if s > 0 and int(s) & pose_encoding.MEASURED else NO_REASON
 
     def _outside(self, found: KnownRecord) -> tuple[float, ...]:
         """Return the external axes that count: declared by the cell, or not 0."""
-        values = [found.number(name) for name in OUTSIDE]
+        values = [found.number(name) for name in symbols.OUTSIDE]
         return tuple(
             value if value != 0.0 or axis in self.axes else math.nan
             for axis, value in enumerate(values, start=1)
@@ -380,10 +353,10 @@ class KrlGoal(GoalReader):
         On an arc or in a spline block that is where the arc or the block begins.
         """
         if self.in_block or self.move.via is not None:
-            return self.unknown(no_target(RUN_TIME), name)
+            return self.unknown(no_target(goals.RUN_TIME), name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
         why = no_target("it stays where it is")
-        return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
+        return FoundGoal(meaning, (0.0,) * pose_encoding.WIDTH, name=name, why=why)
 
     def _home(self, operand: ir.DataObject) -> FoundGoal:
         """Read a home position: it holds no target of a process."""
@@ -406,19 +379,19 @@ class KrlGoal(GoalReader):
         behind = False
         if isinstance(first, ir.DataObject):
             found = self.task.datum(first.name, self.here)
-            behind = found is not None and found[1].type in POSITIONS
+            behind = found is not None and found[1].type in symbols.POSITIONS
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, ir.DataObject):
-            return self.unknown(AT_RUN_TIME)
+            return self.unknown(goals.AT_RUN_TIME)
         base = self.plain_goal(point)
         own, shifts = self._find_own_shift(other), f"{base.name} is shifted by what"
-        shift = FrameReader(self.task, self.row, self.here, _NO, _NO).frame(other)
+        shift = FrameReader(self.task, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not shift.pose:
-            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
+            return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
         if behind and self._by_joints:
             return replace(
                 base, target=Meaning.UNKNOWN, values=self.nothing, why=NO_STATUS,
-                slots=(-1,) * WIDTH, follows=base.origin,
+                slots=(-1,) * pose_encoding.WIDTH, follows=base.origin,
                 pins=base.pins or f"{base.name} is shifted without S and T",
                 holds=base.holds | own,
             )  # fmt: skip
@@ -427,14 +400,14 @@ class KrlGoal(GoalReader):
         aux = self._outside_of(base, other) if behind else base.aux
         turned = f"{base.name} is turned too"
         return self.apply_shift(
-            base, ReadShift(by, file, slots, own, aux, shifts, turned)
+            base, goals.ReadShift(by, file, slots, own, aux, shifts, turned)
         )
 
     def _find_own_shift(self, other: ir.Operand) -> frozenset[tuple[int, int]]:
         """Return where the numbers of a shift begin that stand in the move itself."""
-        value = self.task.value(other, self.row, self.here)
+        value = self.task.value(other, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
-        file, slots = locate_numbers(numbers or (), WIDTH)
+        file, slots = goals.locate_numbers(numbers or (), pose_encoding.WIDTH)
         return frozenset([(file, slots[0])] if file == self.here.file else [])
 
     def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
@@ -443,7 +416,7 @@ class KrlGoal(GoalReader):
         A frame says nothing of them: they stay where they are, wherever the point has
         them at 0. Where the point has them elsewhere it is left like the point itself.
         """
-        value = self.task.value(other, self.row, self.here)
+        value = self.task.value(other, self.here)
         own = self._outside(
             value if isinstance(value, KnownRecord) else KnownRecord(())
         )
@@ -457,32 +430,32 @@ class KrlGoal(GoalReader):
 
         Those of data may serve other moves and sums too: they stay.
         """
-        value = self.task.value(other, self.row, self.here)
+        value = self.task.value(other, self.here)
         record = value if isinstance(value, KnownRecord) else KnownRecord(())
         numbers = _numbers(record, PLACE)
         told = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = numbers if isinstance(other, said.KrlAggregate) else None
-        file, slots = locate_numbers(written or (), WIDTH)
+        file, slots = goals.locate_numbers(written or (), pose_encoding.WIDTH)
         own = file == self.here.file
-        return shift, file, slots if own else (-1,) * WIDTH
+        return shift, file, slots if own else (-1,) * pose_encoding.WIDTH
 
     # Steps.
 
     def _step(self, operand: ir.Operand | None) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
-        found = self.task.value(operand, self.row, self.here)
+        found = self.task.value(operand, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
             found, KnownRecord
         ):
-            return self.unknown(AT_RUN_TIME)
+            return self.unknown(goals.AT_RUN_TIME)
         if not found.whole:
-            return self.unknown(AT_RUN_TIME)
+            return self.unknown(goals.AT_RUN_TIME)
         names = {key for key, _ in found.fields}
         values = {name: found.number(name) for name in names - {"s", "t"}}
-        if self._by_joints and names <= {*AXES, *OUTSIDE}:
-            steps = tuple(values.get(name, 0.0) for name in AXES)
+        if self._by_joints and names <= {*symbols.AXES, *symbols.OUTSIDE}:
+            steps = tuple(values.get(name, 0.0) for name in symbols.AXES)
             return self._step_goal(Meaning.BY, (*steps, 0.0, 0.0), values)
         place = tuple(values.get(name, 0.0) for name in PLACE[:3])
         turned = any(values.get(name, 0.0) for name in PLACE[3:])
@@ -495,13 +468,13 @@ class KrlGoal(GoalReader):
     def _step_goal(
         self, meaning: Meaning, values: tuple[float, ...], given: dict[str, float]
     ) -> FoundGoal:
-        if any(given.get(name, 0.0) for name in OUTSIDE):
+        if any(given.get(name, 0.0) for name in symbols.OUTSIDE):
             return self.unknown(no_target("it moves an external axis"))
         why = no_target("it goes on from where the arm is")
         return FoundGoal(meaning, values, why=why)
 
 
-_NO = no_frame(RUN_TIME)
+_NO = no_frame(goals.RUN_TIME)
 
 
 def _numbers(found: KnownRecord, names: Sequence[str]) -> list[WrittenNumber] | None:

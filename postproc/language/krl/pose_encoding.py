@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.language.pose_encoding import Dialect, Terms
+from postproc.language.pose_encoding import Dialect, Terms, nearer
 from postproc.language.text.comment_directives import Comments
 from postproc.robot.pose import MM
 
@@ -16,7 +16,7 @@ COMMENTS = Comments(";", '"')
 HEADS = tuple("XYZABCST")
 COMPONENTS = tuple(name.lower() for name in HEADS)
 WIDTH = len(HEADS)
-ANGLES, STATUS, TURN = slice(3, 6), 6, 7
+STATUS, TURN = 6, 7
 AXES = np.arange(6)
 NOT_WRITTEN = -1.0  # value of S or T where the position has none
 MEASURED, UNKNOWN_STATUS = 16, 32  # bit 4 of S, and the first value that is none
@@ -76,29 +76,42 @@ class KrlNumbers(Dialect):
     )
     joint_decimals: tuple[int, ...] = (JOINT_DECIMALS,) * WIDTH
 
-    def poses(self, values: Floats) -> Floats:
-        """Return the poses (k, 4, 4) [m] that numbers (k, 8) say."""
-        values = np.asarray(values, dtype=float)
-        T = np.zeros((*values.shape[:-1], 4, 4))
-        T[..., :3, :3] = rotation_from_abc(np.deg2rad(values[..., ANGLES]))
-        T[..., :3, 3] = values[..., :3] * MM
-        T[..., 3, 3] = 1.0
-        return T
+    def rotations(self, written: Floats) -> Floats:
+        """Return the rotations Rz(A) Ry(B) Rx(C) of A, B, C (.., 3) [deg]."""
+        a, b, c = np.moveaxis(np.deg2rad(np.asarray(written, dtype=float)), -1, 0)
+        ca, sa, cb, sb, cc, sc = (f(x) for x in (a, b, c) for f in (np.cos, np.sin))
+        R = np.empty((*a.shape, 3, 3))
+        R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = ca * cb, sa * cb, -sb
+        R[..., 0, 1], R[..., 0, 2] = ca * sb * sc - sa * cc, ca * sb * cc + sa * sc
+        R[..., 1, 1], R[..., 1, 2] = sa * sb * sc + ca * cc, sa * sb * cc - ca * sc
+        R[..., 2, 1], R[..., 2, 2] = cb * sc, cb * cc
+        return R
 
-    def rotate(self, values: Floats, by: Floats) -> Floats:
-        """Turn targets (k, 8) by rotations; angles stay next to what is written."""
-        out, written = np.array(values), np.deg2rad(values[:, ANGLES])
-        new = abc_from_rotation(by @ rotation_from_abc(written), written)
-        out[:, ANGLES] = np.rad2deg(new)
-        return out
+    def orientations(self, R: Floats, near: Floats) -> Floats:
+        """Return the A, B, C of rotations next to others, (k, 3) [deg].
+
+        Where B is 90 deg only a difference of A and C is told: A stays.
+        """
+        near = np.deg2rad(near)
+        cosine = np.hypot(R[:, 0, 0], R[:, 1, 0])
+        b = np.arctan2(-R[:, 2, 0], cosine)
+        a = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+        a = np.where(cosine < 1e-9, near[:, 0], a)
+        # With A known the rest is a turn about x.
+        x = np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=1)
+        y, z = (np.einsum("ki,ki->k", x, R[:, :, axis]) for axis in (1, 2))
+        c = np.arctan2(-z, y)
+        one = np.stack([a, b, c], axis=1)
+        other = np.stack([a + np.pi, np.pi - b, c + np.pi], axis=1)
+        return np.rad2deg(nearer(one, other, near, 2 * np.pi))
 
     def shift_rotations(self, angles: Floats) -> Floats:
         """Return the rotations of A, B, C (k, 3) [deg], see `Dialect`."""
-        return rotation_from_abc(np.deg2rad(angles))
+        return self.rotations(angles)
 
     def shift_angles(self, rotations: Floats, near: Floats) -> Floats:
         """Return A, B, C of rotations, see `Dialect`."""
-        return np.rad2deg(abc_from_rotation(rotations, np.deg2rad(near)))
+        return self.orientations(rotations, near)
 
     def flags(
         self, config: Ints, configs: tuple[str, ...], values: Floats
@@ -116,14 +129,6 @@ class KrlNumbers(Dialect):
         for column, axis in enumerate((3, 5)):
             turns[:, column] = np.where(bits[:, axis] > 0, -half, half)
         return slot, turns
-
-    def flag_words(self, config: str, values: Floats) -> str:
-        """Spell S and T as flags, see `Dialect.flag_words`."""
-        slot, turns = self.flags(np.zeros(1, dtype=np.int64), (config,), values[None])
-        words = [w for w, bit in (("S", 2), ("E", 1), ("W", 4)) if slot[0] & bit]
-        signs = ["<" if turn < 0 else ">" for turn in turns[0, :2].tolist()]
-        said = [f"T{k}:{sign}0" for k, sign in enumerate(signs, start=1)]
-        return " ".join([*words, *said])
 
     def rewrite_flags(self, values: Floats, q: Floats, before: Floats) -> Floats:
         """Write T anew for axes that have passed 0, see `Dialect`.
@@ -192,35 +197,7 @@ def _beyond(bits: Ints, q: Floats, by: float = BORDER) -> Bools:
     return np.asarray(np.where(bits > 0, q > by, q < -by))
 
 
-def rotation_from_abc(angles: Floats) -> Floats:
-    """Convert A, B, C (.., 3) [rad] to rotations Rz(A) Ry(B) Rx(C), (.., 3, 3)."""
-    a, b, c = np.moveaxis(np.asarray(angles, dtype=float), -1, 0)
-    ca, sa, cb, sb, cc, sc = (f(x) for x in (a, b, c) for f in (np.cos, np.sin))
-    R = np.empty((*a.shape, 3, 3))
-    R[..., 0, 0], R[..., 1, 0], R[..., 2, 0] = ca * cb, sa * cb, -sb
-    R[..., 0, 1], R[..., 0, 2] = ca * sb * sc - sa * cc, ca * sb * cc + sa * sc
-    R[..., 1, 1], R[..., 1, 2] = sa * sb * sc + ca * cc, sa * sb * cc - ca * sc
-    R[..., 2, 1], R[..., 2, 2] = cb * sc, cb * cc
-    return R
-
-
-def abc_from_rotation(R: Floats, near: Floats) -> Floats:
-    """Convert rotations (k, 3, 3) to the A, B, C next to others, (k, 3) [rad].
-
-    Where B is 90 deg only a difference of A and C is told: A stays.
-    """
-    cosine = np.hypot(R[:, 0, 0], R[:, 1, 0])
-    b = np.arctan2(-R[:, 2, 0], cosine)
-    a = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    a = np.where(cosine < 1e-9, near[:, 0], a)
-    # With A known the rest is a turn about x.
-    x = np.stack([-np.sin(a), np.cos(a), np.zeros_like(a)], axis=1)
-    c = np.arctan2(
-        -np.einsum("ki,ki->k", x, R[:, :, 2]), np.einsum("ki,ki->k", x, R[:, :, 1])
-    )
-    one = np.stack([a, b, c], axis=1)
-    other = np.stack([a + np.pi, np.pi - b, c + np.pi], axis=1)
-    both = np.stack([one, other])
-    both -= 2 * np.pi * np.round((both - near) / (2 * np.pi))
-    gap = np.abs(both - near).max(axis=2)
-    return np.asarray(np.where((gap[0] <= gap[1])[:, None], both[0], both[1]))
+def numbers_of(pose: Floats) -> list[float]:
+    """Return X, Y, Z [mm] and A, B, C [deg] of a pose, (4, 4) [m]."""
+    angles = KRL_DIALECT.orientations(pose[None, :3, :3], np.zeros((1, 3)))[0]
+    return [*(pose[:3, 3] / MM).tolist(), *angles.tolist()]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -17,20 +18,10 @@ from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
-from postproc.language.analysis.values import (
-    KnownRecord,
-    Layout,
-    Value,
-    WrittenNumber,
-)
+from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.abstract_state import TABLES
-from postproc.language.krl.external_routines import package_routines
-from postproc.language.krl.pose_encoding import (
-    COMMENTS,
-    COMPONENTS,
-    KRL_DIALECT,
-)
+from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.shifts import Shift, ShiftKind
 
@@ -91,6 +82,29 @@ FUNCTIONS = frozenset(
     k_root k_type k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
     """.split()
 )
+# Routines of packages that are known neither to move the arm nor to set frames.
+
+_LIST = Path(__file__).with_name("still_routines.txt")
+AHEAD = "ahead"
+ASSUMED = (
+    "is not in the available files: it is on the list of routines known neither to "
+    "move the arm nor to set frames (docs/routines.md). If it does, say so under "
+    "[routines] in the cell file, or set assume_motion"
+)
+
+
+@cache
+def package_routines() -> Mapping[str, str]:
+    """Return the shipped list: lower-case names, and what stands behind them.
+
+    >>> package_routines()["set_cd_params"], package_routines()["h50"]
+    ('ahead', '')
+    """
+    lines = (line.partition("#")[0] for line in _LIST.read_text("ascii").splitlines())
+    words = (line.split() for line in lines if line.strip())
+    return {name: " ".join(rest) for name, *rest in words}
+
+
 KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
 """Routines that change nothing of what they get."""
 
@@ -214,17 +228,17 @@ class KrlTask(TaskSymbols[KrlFile]):
         for table in self.odd_words.intersection(TABLES):
             found[table].add(ANY)
         for number, file in enumerate(self.files):
-            here = Scope(number, file.name, "")
+            there = Scope(number, file.name, "")
             for row in file.text.where(lambda one: bool(self.list_changes(one))):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in found and not given:
-                        found[target.name].add(self._entry(target, row, here))
+                        found[target.name].add(self._entry(target, there.at(row)))
         return {table: frozenset(numbers) for table, numbers in found.items()}
 
-    def _entry(self, target: ir.DataObject, row: int, here: Scope) -> int:
+    def _entry(self, target: ir.DataObject, here: Scope) -> int:
         """Return the number of an entry, ANY where it is not known."""
-        index = self.index(target.steps[0], row, here) if target.steps else None
+        index = self.index(target.steps[0], here) if target.steps else None
         return index[0] if index is not None and len(index) == 1 else ANY
 
     def initial_switch(self, name: str) -> bool | None:
@@ -324,9 +338,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     # Values.
 
-    def build(
-        self, operand: ir.Operand, row: int, here: Scope, depth: int
-    ) -> Value | None:
+    def build(self, operand: ir.Operand, here: Scope, depth: int) -> Value | None:
         """Evaluate words and aggregates.
 
         What a component is that is written twice is not known.
@@ -337,7 +349,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             case said.KrlAggregate(fields=fields):
                 times = Counter(f.name for f in fields)
                 once = [f for f in fields if times[f.name] == 1]
-                pairs = [(f.name, self.value(f.value, row, here, depth)) for f in once]
+                pairs = [(f.name, self.value(f.value, here, depth)) for f in once]
                 known = tuple((name, one) for name, one in pairs if one is not None)
                 return KnownRecord(known, len(known) == len(fields))
         return None

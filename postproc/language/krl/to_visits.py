@@ -8,28 +8,16 @@ from collections.abc import Container, Mapping, Sequence
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
-from postproc.language.analysis.conditions import (
-    NO_LOAD,
-    Conditions,
-    Zone,
-    cell_pose,
-)
+from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
 from postproc.language.analysis.found_visits import FoundGoal, not_reached
 from postproc.language.analysis.to_visits import Arrival, zone_at
+from postproc.language.krl import modal_state
 from postproc.language.krl.interpreter import KrlMachine
-from postproc.language.krl.modal_state import (
-    LOST_LOAD,
-    OF_TRACK,
-    UNKNOWN,
-    UNKNOWN_LOAD,
-    KrlModes,
-    ModeReader,
-)
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
 from postproc.language.shifts import Pose
-from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
+from postproc.language.visits import Meaning, OrientationLaw, Switch
 from postproc.robot.trajectory import Motion
 
 STOP, PASS, MAYBE = "stop", "pass", "maybe"
@@ -45,8 +33,7 @@ _STILL_TOOL = Reason(
 _NOT_TURNED = {
     "#constant": _STILL_TOOL,
     "#ignore": Reason(
-        Code.ORIENTATION_LAW,
-        "$ORI_TYPE = #IGNORE: the tool does not turn to the point",
+        Code.ORIENTATION_LAW, "$ORI_TYPE = #IGNORE: the tool does not turn to the point"
     ),
 }
 _MAY_NOT_TURN = Reason(
@@ -62,34 +49,68 @@ _SWAPPED = Reason(
 _NOT_SET = "an inline setting (WITH) is not known"
 
 
-def visits_of(machine: KrlMachine) -> Visits:
-    """Put the arrivals into the order of the program, as columns."""
-    found: Sequence[KrlVisit] = machine.visits
-    _keep_orientation(machine, found)
-    _follow_partial(machine, found)
-    ends, odd = _ends(found, machine.lost), _odd_status(found)
-    base = cell_pose(machine.start.base)
-    number = {id(v): k for k, v in enumerate(found)}
+class KrlCollector(to_visits.TaskCollector):
+    """Makes the visits of a KRL job."""
 
-    def arrive(v: KrlVisit) -> Arrival:
-        at = number[id(v)]
+    dialect = KRL_DIALECT
+
+    def __init__(self, machine: KrlMachine) -> None:
+        """Find what ways to other arrivals tell of each."""
+        found: Sequence[KrlVisit] = machine.visits
+        _keep_orientation(machine, found)
+        _follow_partial(machine, found)
+        super().__init__(machine)
+        self.krl, self.base = machine, cell_pose(machine.start.base)
+        self.ends, self.odd = _ends(found, machine.lost), _odd_status(found)
+        self.number = {id(v): k for k, v in enumerate(found)}
+
+    def arrive(self, v: KrlVisit) -> Arrival:
+        """Say what an arrival is carried out with."""
+        machine, at = self.krl, self.number[id(v)]
+        modes, unset = _effective(machine, v)
+        joint = v.motion == Motion.JOINT
+        active = {why for _, why in modes.active}
         early = machine.early.get(at, frozenset())
-        return _arrive(machine, v, base, ends[at], at in odd, early)
+        blocked = modes.blocked | active | machine.everywhere | early
+        if "track" not in machine.start.aux.values():
+            blocked -= modal_state.OF_TRACK
+        given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
+        if v.goal.target != Meaning.JOINTS:
+            given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
+            # Frames that were set for a fixed tool hold for no other move.
+            remote = modes.tool.remote or modes.base.remote
+            swapped = remote and modes.interpolation != "#tcp"
+            given += (_SWAPPED if swapped else NO_REASON,)
+        given += (_STATUS if at in self.odd else NO_REASON,)
+        lost = modes.load == modal_state.LOST_LOAD
+        given += (modal_state.UNKNOWN_LOAD if lost else NO_REASON,)
+        conditions = Conditions(
+            tool=modes.tool.pose,
+            base=self.base,
+            uframe=modes.base.pose,
+            taught=(modes.tool.taught, False, modes.base.taught),
+            remote=modes.interpolation == "#tcp",
+            care=(Switch.ON if joint else Switch.OFF,) * 3,
+            law=_law(v, modes),
+            zone=_zone(v, modes, self.ends[at]),
+            speed=modes.speed if modes.speed > 0 else math.nan,
+            wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
+            override=modes.share if joint and modes.share > 0.0 else 1.0,
+            load=_load(modes),
+        )
+        return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
 
-    return to_visits.visits_of(machine, KRL_DIALECT, arrive)
 
-
-def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
+def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[modal_state.KrlModes, Reason]:
     """Add what a move sets for itself; say where that is not known."""
-    modes: KrlModes = v.modes
-    given = [(v.row, one) for one in v.move.settings]
+    modes: modal_state.KrlModes = v.modes
+    given = [(v.scope, one) for one in v.move.settings]
     if v.begin >= 0:
         block = machine.texts[v.scope.file].statement(v.begin)
         assert isinstance(block, SplineBlock)
-        given = [(v.begin, one) for one in block.settings] + given
-    for row, setting in given:
-        reader = ModeReader(machine.task, row, v.scope)
-        after = reader.assign(modes, setting)
+        given = [(v.scope.at(v.begin), one) for one in block.settings] + given
+    for here, setting in given:
+        after = modal_state.ModeReader(machine.task, here).assign(modes, setting)
         if after is None:
             text = f"{_NOT_SET}: {setting.target.name.upper()}"
             return modes, Reason(Code.SETTING_UNTRACKED, text)
@@ -97,54 +118,13 @@ def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, Reason]:
     return modes, NO_REASON
 
 
-def _arrive(
-    machine: KrlMachine,
-    v: KrlVisit,
-    base: Pose,
-    end: str,
-    odd: bool,
-    early: frozenset[Reason],
-) -> Arrival:
-    """Say what an arrival is carried out with."""
-    modes, unset = _effective(machine, v)
-    joint = v.motion == Motion.JOINT
-    active = {why for _, why in modes.active}
-    blocked = modes.blocked | active | machine.everywhere | early
-    if "track" not in machine.start.aux.values():
-        blocked -= OF_TRACK
-    given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
-    if v.goal.target != Meaning.JOINTS:
-        given += (modes.base.why, NO_REASON if modes.interpolation else _IPO)
-        # Frames that were set for a fixed tool hold for no other move.
-        remote = modes.tool.remote or modes.base.remote
-        swapped = remote and modes.interpolation != "#tcp"
-        given += (_SWAPPED if swapped else NO_REASON,)
-    given += (_STATUS if odd else NO_REASON,)
-    given += (UNKNOWN_LOAD if modes.load == LOST_LOAD else NO_REASON,)
-    conditions = Conditions(
-        tool=modes.tool.pose,
-        base=base,
-        uframe=modes.base.pose,
-        taught=(modes.tool.taught, False, modes.base.taught),
-        remote=modes.interpolation == "#tcp",
-        care=(Switch.ON if joint else Switch.OFF,) * 3,
-        law=_law(v, modes),
-        zone=_zone(v, modes, end),
-        speed=modes.speed if modes.speed > 0 else math.nan,
-        wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
-        override=modes.share if joint and modes.share > 0.0 else 1.0,
-        load=_load(modes),
-    )
-    return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
-
-
-def _load(modes: KrlModes) -> tuple[float, ...]:
+def _load(modes: modal_state.KrlModes) -> tuple[float, ...]:
     """Return what the program states that the arm carries, see `Conditions.load`."""
-    unknown = not modes.load or modes.load == LOST_LOAD
+    unknown = not modes.load or modes.load == modal_state.LOST_LOAD
     return NO_LOAD if unknown else (*modes.load, *(math.nan,) * 3)[:4]
 
 
-def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
+def _law(v: KrlVisit, modes: modal_state.KrlModes) -> OrientationLaw:
     """Tell how the tool turns on the way."""
     if v.motion != Motion.CIRCULAR or modes.orientation != "#var":
         return modes.law
@@ -157,7 +137,7 @@ def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
     return OrientationLaw.START_TO_END if known else OrientationLaw.ALONG_PATH
 
 
-def _zone(v: KrlVisit, modes: KrlModes, end: str) -> Zone:
+def _zone(v: KrlVisit, modes: modal_state.KrlModes, end: str) -> Zone:
     """Tell how a point is passed."""
     if v.inner and not v.via:
         return zone_at(v.via, exact=True)
@@ -168,10 +148,10 @@ def _zone(v: KrlVisit, modes: KrlModes, end: str) -> Zone:
         return unsized
     words = v.move.words
     if "c_ptp" in words and "c_dis" not in words:
-        known = modes.overlap != UNKNOWN
+        known = modes.overlap != modal_state.UNKNOWN
         return zone_at(v.via, overlap=modes.overlap) if known else unsized
     by_distance = "c_dis" in words or "c_spl" in words
-    if not by_distance or modes.distance == UNKNOWN:
+    if not by_distance or modes.distance == modal_state.UNKNOWN:
         return unsized
     return zone_at(v.via, modes.distance)
 

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.call_context import At
 from postproc.language.language import Record
+from postproc.language.pdl2 import external_routines, side_effects
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.conditions import DISTURBING
@@ -20,12 +22,6 @@ from postproc.language.pdl2.evaluate import (
     parts_of,
     set_owner,
 )
-from postproc.language.pdl2.external_routines import (
-    TRACKING,
-    RoutineEffect,
-    effect_of,
-    report_unknown_routine,
-)
 from postproc.language.pdl2.job import Place
 from postproc.language.pdl2.machine import (
     Execution,
@@ -36,15 +32,6 @@ from postproc.language.pdl2.machine import (
     let_others_run,
 )
 from postproc.language.pdl2.moves import move
-from postproc.language.pdl2.side_effects import (
-    CHANGING,
-    NODES,
-    PURE,
-    CallGraph,
-    LiveRows,
-    call_graph_of,
-    list_changed_arguments,
-)
 from postproc.language.pdl2.values import (
     Alias,
     Location,
@@ -68,7 +55,7 @@ def summarise_call(
     machine: Machine,
     here: Execution,
     name: str,
-    reach: CallGraph,
+    reach: side_effects.CallGraph,
     arguments: tuple[ir.Operand | None, ...] = (),
     parameters: Sequence[ast.FormalParameter] = (),
 ) -> None:
@@ -91,7 +78,7 @@ def summarise_call(
 
 
 def take_effects(
-    here: Execution, parts: Sequence[LiveRows], computes: str, changes: str
+    here: Execution, parts: Sequence[side_effects.LiveRows], computes: str, changes: str
 ) -> None:
     """Take in what rows do to variables that are not followed, and say so."""
     for part in parts:
@@ -138,11 +125,13 @@ def call_statement(machine: Machine, here: Execution, call: ir.Instruction) -> b
         _say(here, Code.RECURSION, name, "calls itself and is not followed: the next "
              "move is assumed to start at an unknown place. Write it as a "
              "loop")  # fmt: skip
-        summarise_call(machine, here, name, call_graph_of(here.world, inside))
+        summarise_call(
+            machine, here, name, side_effects.call_graph_of(here.world, inside)
+        )
         here.store.lose_place()
         return False
     _bind(here, inside, call.values)
-    machine.call(here.context, here.row, inside, here.store)
+    machine.call(At(here.context, here.row), inside, here.store)
     return True
 
 
@@ -155,7 +144,7 @@ def calls_in_expressions(
         if inside is None:
             opaque_call(here, call.name, call.values)
             continue
-        name, reach = inside.body.name, call_graph_of(here.world, inside)
+        name, reach = inside.body.name, side_effects.call_graph_of(here.world, inside)
         answer, key = _run_function(machine, here, inside, call), here.answer_key(call)
         here.store.drop(key)
         if answer is not None:
@@ -232,41 +221,43 @@ def opaque_call(
     here: Execution, name: str, arguments: tuple[ir.Operand | None, ...]
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
-    built_in = name in CHANGING or name in PURE
+    built_in = name in side_effects.CHANGING or name in side_effects.PURE
     why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
-    if name not in NODES:
+    if name not in side_effects.NODES:
         for given in arguments:
             here.world.pin(here.value(given), why)
         named = frozenset(r.name for r in map(bare, arguments) if r is not None)
         escape_names(here, named, why)
-    for argument in list_changed_arguments(arguments):
+    for argument in side_effects.list_changed_arguments(arguments):
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
         return
     let_others_run(here)
-    match effect_of(here.world, here.place.program, name):
-        case RoutineEffect.TABLE:
+    match external_routines.effect_of(here.world, here.place.program, name):
+        case external_routines.RoutineEffect.TABLE:
             _frames_from_table(here, name, arguments)
-        case RoutineEffect.MOVES:
+        case external_routines.RoutineEffect.MOVES:
             here.store.lose_place()
-        case RoutineEffect.SETS_FRAMES:
+        case external_routines.RoutineEffect.SETS_FRAMES:
             here.store.forget_frames(f"{name} sets it; give its table under "
                                      f"[frames.routines.{name}] in the cell "
                                      "file")  # fmt: skip
-        case RoutineEffect.TRACKS:
+        case external_routines.RoutineEffect.TRACKS:
             on = here.value(arguments[0]) if arguments else Nothing("")
-            here.store.set(**{TRACKING: on})
+            here.store.set(**{external_routines.TRACKING: on})
             here.store.lose_place()
             _say(here, Code.POSITION_UNKNOWN, name, "lets a sensor guide the arm, or "
                  "ends that: the next move starts at an unknown place")  # fmt: skip
-        case RoutineEffect.KNOWN:
+        case external_routines.RoutineEffect.KNOWN:
             _say(here, Code.ROUTINE_ASSUMED_MOTIONLESS, name,
                  "is not in the given files. It is assumed to neither move the arm "
                  "nor set frames, because it is on the list of such routines "
                  "(docs/routines.md). If it does, declare it under [routines] of the "
                  "cell, or set assume_motion")  # fmt: skip
-        case RoutineEffect.UNKNOWN:
-            report_unknown_routine(here.world, here.place.program, here.row, name)
+        case external_routines.RoutineEffect.UNKNOWN:
+            external_routines.report_unknown_routine(
+                here.world, here.place.program, here.row, name
+            )
             here.store.forget_surroundings(
                 f"{name}, which is not in the given files, may set it: declare it "
                 "under [routines] of the cell")  # fmt: skip

@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.call_context import CALLED, HANDLED, Context
+from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.language import Start
+from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import FRAMES, Store, root_of
-from postproc.language.pdl2.calls import (
-    assign,
-    call_statement,
-    calls_in_expressions,
-    frame_value,
-    list_moves,
-    take_effects,
-)
-from postproc.language.pdl2.entries import POSITIONS, Entries
-from postproc.language.pdl2.evaluate import ProgramPoint
-from postproc.language.pdl2.exported_variables import (
-    IMPORTED,
-    changing_variables,
-    find_imported_points,
-)
-from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
-from postproc.language.pdl2.kept_values import keep_values
+from postproc.language.pdl2.abstract_state import FRAMES, Store
+from postproc.language.pdl2.initial_values import fill_initial, keep_values
+from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
-    OTHERS_WRITE,
     Execution,
     Goal,
     Machine,
@@ -45,7 +28,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.moves import move
-from postproc.language.pdl2.program import Program, Variable, Variables
+from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.side_effects import (
     CallGraph,
     is_harmless,
@@ -55,24 +38,9 @@ from postproc.language.pdl2.side_effects import (
     names_but_ends,
     words_in,
 )
-from postproc.language.pdl2.to_visits import collect
-from postproc.language.pdl2.values import (
-    Nothing,
-    Position,
-    Value,
-    Vector,
-    points_of,
-)
+from postproc.language.pdl2.to_visits import Collector
 from postproc.language.pdl2.variable_file import VariableFile
-from postproc.language.pdl2.variable_file import VariableFile as ValueFile
-from postproc.language.text.symbol_column import NameColumn
-from postproc.language.visits import (
-    ELSEWHERE,
-    START,
-    Diagnostic,
-    Meaning,
-    Visits,
-)
+from postproc.language.visits import ELSEWHERE, START, Diagnostic, Meaning, Visits
 from postproc.robot.trajectory import Motion
 
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
@@ -92,38 +60,32 @@ class Pdl2Machine(Machine):
         """Find blocks with what is known of the job."""
         self.blocks = MoveBlocks(self)
 
-    def at(self, context: Context, row: int, store: Store) -> Execution:
+    def point(self, at: At, store: Store) -> Execution:
         """Return the point of the execution at a row."""
-        return Execution(self.world, context.place, row, store, self.volatile, context)
+        return Execution(self.world, at.place, at.row, store, self.volatile, at.context)
 
-    def run_block(
-        self, context: Context, row: int, state: Store
-    ) -> tuple[int, Store] | None:
+    def run_block(self, at: At, state: Store) -> tuple[int, Store] | None:
         """Run a block of moves, or all moves of a body whose blocks do not close."""
-        here = self.at(context, row, state)
+        here = self.point(at, state)
         if here.place.body.broken:
             run_broken(self, here)
             return here.place.body.last, state
         return (here.row, state) if self.blocks.run(here) else None
 
-    def act(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Store
-    ) -> Store | None:
+    def act(self, at: At, one: ir.SourceStatement, state: Store) -> Store | None:
         """Run one statement that leads to the next row, or into a routine."""
         if isinstance(one, ast.When):
             then = one.then
-            return state if then is None else self.run_one(context, row, then, state)
-        here = self.at(context, row, state)
+            return state if then is None else self.run_one(at, then, state)
+        here = self.point(at, state)
         text = one.text if isinstance(one, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         return state if step(self, here, one) else None
 
-    def before(
-        self, context: Context, row: int, one: ir.SourceStatement, state: Store
-    ) -> Store:
+    def before(self, at: At, one: ir.SourceStatement, state: Store) -> Store:
         """Allow for what a line does besides leading elsewhere."""
-        here = self.at(context, row, state)
-        written = here.place.program.lines.statement(row)
+        here = self.point(at, state)
+        written = here.place.program.lines.statement(at.row)
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if text:
@@ -133,46 +95,46 @@ class Pdl2Machine(Machine):
         return state
 
     def evaluate(
-        self, context: Context, row: int, operand: ir.Operand | None, state: Store
+        self, at: At, operand: ir.Operand | None, state: Store
     ) -> float | str | None:
         """Return a number, a text or a truth, None where only the run tells."""
-        found = self.at(context, row, state).value(operand)
+        found = self.point(at, state).value(operand)
         return found if isinstance(found, float | bool | str) else None
 
     def selector(self, head: ir.SourceStatement) -> ir.Operand | None:
         """Return what SELECT names."""
         return super().selector(ast.action(head) or head)
 
-    def counts_alone(self, context: Context, row: int, loop: ir.ForLoop) -> bool:
+    def counts_alone(self, at: At, loop: ir.ForLoop) -> bool:
         """Tell whether nothing but a loop itself changes its variable."""
-        place, key = context.place, self.world.root(context.place, loop.name)
-        inside = list_live(self.world, place, row + 1, place.flow.end[row])
+        place, key = at.place, self.world.root(at.place, loop.name)
+        inside = list_live(self.world, place, at.row + 1, place.flow.end[at.row])
         return loop.name not in self.volatile and not any(
             loop.name in part.effects.assigned
             and self.world.root(part.place, loop.name) == key
             for part in inside
         )
 
-    def say_not_unrolled(self, context: Context, row: int, rounds: int) -> None:
+    def say_not_unrolled(self, at: At, rounds: int) -> None:
         """Say that a loop runs too often to be followed round by round."""
         text = NOT_UNROLLED.format(rounds)
-        program = context.place.program
-        self.world.report_once(program, row, Code.LOOP_NOT_UNROLLED, str(row), text)
+        code, program = Code.LOOP_NOT_UNROLLED, at.place.program
+        self.world.report_once(program, at.row, code, str(at.row), text)
 
     def begin_round(
-        self, outer: Context, row: int, loop: ir.ForLoop, value: float, state: Store
+        self, at: At, loop: ir.ForLoop, value: float, state: Store
     ) -> tuple[Place, Store]:
         """Give the variable of a loop its value."""
-        key = self.at(outer, row, state).locate(ir.DataObject(loop.name)).key
+        key = self.point(at, state).locate(ir.DataObject(loop.name)).key
         state.write(key, value)
-        return outer.place, state
+        return at.place, state
 
     def forget_counter(
-        self, context: Context, row: int, loop: ir.ForLoop, ended: bool, state: Store
+        self, at: At, loop: ir.ForLoop, ended: bool, state: Store
     ) -> Store:
         """Forget the variable of a loop."""
         why = "it counted a loop that has ended" if ended else "it counts a loop"
-        invalidate(self.at(context, row, state), ir.DataObject(loop.name), why)
+        invalidate(self.point(at, state), ir.DataObject(loop.name), why)
         return state
 
     def leave(self, context: Context, state: Store, by_return: bool = False) -> None:
@@ -180,18 +142,16 @@ class Pdl2Machine(Machine):
         call = context.call
         body = call.place.body
         if not by_return and body.flow.cycle >= 0 and not body.name:
-            self.enter(call, body.flow.cycle, state)
+            self.enter(At(call, body.flow.cycle), state)
         elif call.kind == CALLED:
             for name in body.own_names:
                 state.drop(self.world.root(call.place, name))
             self.return_to_caller(call, state)
 
-    def leave_otherwise(
-        self, context: Context, row: int, one: ir.Leave, state: Store
-    ) -> Store | None:
+    def leave_otherwise(self, at: At, one: ir.Leave, state: Store) -> Store | None:
         """Begin the next cycle (EXIT CYCLE); without one the program goes on."""
-        _cancel(self.at(context, row, state))
-        return None if self.begin_cycle(context, state) else state
+        _cancel(self.point(at, state))
+        return None if self.begin_cycle(at.context, state) else state
 
 
 # What each statement does to the store.
@@ -216,7 +176,7 @@ def prepare(
         machine.paused |= here.store.last
     if _lets_others_run(statement) or text:
         let_others_run(here)
-    calls_in_expressions(machine, here, statement)
+    calls.calls_in_expressions(machine, here, statement)
 
 
 def _lets_others_run(one: ir.SourceStatement) -> bool:
@@ -235,9 +195,9 @@ def step(machine: Machine, here: Execution, statement: ir.SourceStatement) -> bo
         case ir.Assignment():
             lines = here.place.program.lines
             taught = here.world.taught_lines[lines.source.name]
-            assign(here, statement, lines.line(here.row) in taught)
+            calls.assign(here, statement, lines.line(here.row) in taught)
         case ir.Instruction():
-            return not call_statement(machine, here, statement)
+            return not calls.call_statement(machine, here, statement)
         case ast.Transfer("WRITE", operands):
             for operand in operands:
                 here.world.pin(here.value(operand), "the program writes it out")
@@ -323,174 +283,9 @@ def run_broken(machine: Machine, here: Execution) -> None:
             here.store.last = frozenset({ELSEWHERE})
             move(machine, here, said)
     inside = list_live(here.world, here.place, body.first, body.last)
-    take_effects(here, inside, f"{why}: it may be used in a computation", why)
+    calls.take_effects(here, inside, f"{why}: it may be used in a computation", why)
     here.store.forget_frames(why)
     here.store.last = frozenset({ELSEWHERE})
-
-
-# What variables hold before a program assigns them.
-
-
-def fill_initial(world: World) -> None:
-    """Enter declared initial values, constants and the variable file's values."""
-    world.changing = changing_variables(world)
-    world.imported = find_imported_points(world)
-    for place, seen in world.declarations():
-        _enter_declarations(world, place, seen)
-    if world.variables is not None and world.main.main is not None:
-        place = world.place(world.main, world.main.main)
-        _enter_all(world, place, world.variables)
-        _report_drift(world, place, world.variables)
-
-
-def _report_drift(world: World, place: Place, file: ValueFile) -> None:
-    """Say where a program and its variable file have drifted apart."""
-    for found in file.diagnostics:
-        world.diagnostics[found] = None
-    entries, names = file.entries, file.entries.row.names
-    written: Sequence[str] = entries.name.take(entries.row.rows.astype(np.int64))
-    if entries.parts:
-        bases = {base_variable(name): name.partition(".")[0] for name in written}
-        names, written = NameColumn(bases), [*bases.values()]
-    used = place.program.lines.said.tell(names)
-    declared = place.program.variables.names.find(names) >= 0
-    if used.all() and declared.all():  # as nearly always
-        return
-    unused = [written[k] for k in np.flatnonzero(~used).tolist()]
-    undeclared = [written[k] for k in np.flatnonzero(used & ~declared).tolist()]
-    if names and len(unused) == len(names):
-        _say(world, file, Code.LSV_OTHER_PROGRAM, "none of its variables is used by "
-             f"{place.program.name}: is it the file of another program?")  # fmt: skip
-    elif unused:
-        _say(world, file, Code.LSV_UNUSED, f"never used: {_some(unused)}")
-    if undeclared:
-        text = f"used by the program, but not declared there: {_some(undeclared)}"
-        _say(world, file, Code.LSV_UNDECLARED, text)
-
-
-def _say(world: World, file: ValueFile, code: Code, text: str) -> None:
-    world.diagnostics[Diagnostic(file.source.name, 1, code, text)] = None
-
-
-def _some(names: list[str]) -> str:
-    rest = f" and {len(names) - 10} more" if len(names) > 10 else ""
-    return ", ".join(names[:10]) + rest
-
-
-def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
-    """Enter the initial values of declarations, one by one: most have none."""
-    store = Store(world.initial.find)
-    for variable in (*_with_value(seen), *_with_value(place.body.variables)):
-        key = world.root(place, variable.name.lower())
-        if variable.initial is None or key in world.initial:
-            continue
-        if why := _why_untrusted(world, key):
-            world.initial[key] = Nothing(why)
-            continue
-        value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
-        if variable.arm not in (0, world.arm):
-            value = Nothing(points_of(variable.arm))
-        if isinstance(value, Position) and not value.name:
-            value = replace(
-                value,
-                name=variable.name,
-                taught=variable.taught,
-                shared=bool(variable.exported),
-            )
-        world.initial[key] = value
-
-
-def _with_value(seen: Variables) -> list[Variable]:
-    return [seen[name] for name in seen.which(lambda said: said.initial is not None)]
-
-
-def _enter_all(world: World, place: Place, file: ValueFile) -> None:
-    """Enter what a variable file says: points as columns, the rest one by one."""
-    entries, base = file.entries, world.slot_base[file.source.name]
-    places = [layout.kind in POSITIONS for layout in entries.layouts]
-    known = np.array(places, dtype=bool)[entries.layout]
-    known &= np.isfinite(entries.numbers).all(axis=1)
-    known &= np.isin(entries.arm, (0, world.arm))
-    of_other_arm = _list_rows_where(
-        lambda v: v.arm not in (0, world.arm), place.program, entries
-    )
-    known[of_other_arm] = False
-    shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
-    shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
-    named = entries.row.rows
-    own, exported = known.copy(), dict[str, int]()
-    marked = _list_rows_where(
-        lambda v: v.taught or bool(v.exported), place.program, entries
-    )
-    for row in marked:
-        name = entries.name[row].lower()
-        root = root_of(name)
-        declared = place.program.variables[root]
-        taught[row], shared[row] = (
-            declared.taught,
-            shared[row] | bool(declared.exported),
-        )
-        if known[row] and declared.exported:
-            own[row] = False
-            key = world.root(place, root)
-            if key in world.imported:
-                world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
-            else:
-                exported[key + name[len(root) :]] = row
-    for row in named[~known[named]].tolist():
-        name = entries.name[row].lower()
-        root = root_of(name)
-        key = world.root(place, root) + name[len(root) :]
-        arm = world.other_arm(place, root)
-        _enter(world, file, row, key, arm)
-    prefix = f"{place.program.name}/"
-    world.initial.points = FilePoints(
-        prefix, own, entries, base, shared, taught, np.zeros(len(own), bool)
-    )
-    for key, row in exported.items():
-        world.initial[key] = world.initial.points.position(row)
-
-
-def _list_rows_where(
-    holds: Callable[[Variable], bool], program: Program, entries: Entries
-) -> list[int]:
-    """List the rows of variables whose declaration fulfils a condition."""
-    names = {*program.variables.which(holds)}
-    if not names:
-        return []
-    return [row for name, row in entries.row.items() if root_of(name) in names]
-
-
-def _enter(world: World, file: ValueFile, row: int, key: str, arm: int) -> None:
-    """Enter a value that is no known point, where there is any, or another arm's."""
-    entries, kind = file.entries, file.entries.layout_of(row).kind
-    numbers, own = entries.numbers_of(row), int(entries.arm[row])
-    value: Value | None = numbers[0]
-    if kind in POSITIONS:
-        value = Nothing(
-            f"its value is not initialised in {file.source.name}",
-            code=Code.LSV_UNINITIALISED,
-        )
-    if kind == "VEC":
-        x, y, z = numbers[:3]
-        value = Vector((x, y, z))
-    if value is None and "." in entries.name[row]:  # that it is there counts
-        value = Nothing(f"its value in {file.source.name} is no number")
-    if arm or own not in (0, world.arm):
-        value = Nothing(points_of(arm or own))
-    if value is not None:
-        why = _why_untrusted(world, root_of(key))
-        world.initial[key] = Nothing(why) if why else value
-
-
-def _why_untrusted(world: World, root: str) -> str:
-    """Say why the first value of a variable is not taken from a file, else ""."""
-    if root in world.imported:
-        return IMPORTED
-    return OTHERS_WRITE if root in world.changing else ""
-
-
-# From a parsed program to its visits: what it moves to, and from where.
 
 
 @dataclass(frozen=True)
@@ -540,7 +335,7 @@ def resolve(
     _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
-    visits = collect(machine)
+    visits = Collector(machine).collect()
     machine.root.forget()
     return Resolved(visits, tuple(sorted(world.diagnostics)))
 
@@ -571,7 +366,7 @@ def _list_moves(world: World) -> Machine:
     for place, _ in world.declarations():
         here = Execution(world, place, place.body.first, Store(lambda key: None))
         name = place.body.name or place.program.name
-        list_moves(machine, here, place, name)
+        calls.list_moves(machine, here, place, name)
     return machine
 
 
@@ -580,7 +375,7 @@ def _start(machine: Machine) -> None:
     program, start = world.main, world.start
     store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
-    store.set(**{name: frame_value(getattr(start, name), why) for name in FRAMES})
+    store.set(**{name: calls.frame_value(getattr(start, name), why) for name in FRAMES})
     if start.linear_speed is not None:
         store.set(lin_spd=start.linear_speed)
     if start.override is not None:
@@ -589,13 +384,13 @@ def _start(machine: Machine) -> None:
     _handlers(machine, store)
     if program.main is not None:
         machine.root.place = world.place(program, program.main)
-        machine.enter(machine.root, program.main.first + 1, store)
+        machine.enter(At(machine.root, program.main.first + 1), store)
 
 
 def _handlers(machine: Machine, store: Store) -> None:
     """Condition handlers run at any time: nothing they change is ever known."""
     world = machine.world
-    nothing = Nothing("a condition handler runs at any time")
+    nothing = values.Nothing("a condition handler runs at any time")
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
     unknown.changing = world.changing
     unknown.given, unknown.lost = store.given, store.lost
@@ -614,7 +409,7 @@ def _handlers(machine: Machine, store: Store) -> None:
                 _cancelling_handler(machine, place, first, reach)
     for name in machine.volatile:
         if name.startswith("$"):
-            store.set(**{name[1:]: Nothing("a condition handler changes it")})
+            store.set(**{name[1:]: values.Nothing("a condition handler changes it")})
 
 
 def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool:
@@ -656,4 +451,4 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
     text = f"this condition handler {moves}: the start of every move is uncertain"
     machine.world.report_once(place.program, row, code, str(row), text)
     context = machine.root.within(place.offset + row, HANDLED, place)
-    machine.enter(context, row + 1, store)
+    machine.enter(At(context, row + 1), store)

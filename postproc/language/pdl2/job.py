@@ -31,8 +31,6 @@ from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
-# What variables hold when a program starts, by key.
-
 
 @dataclass(frozen=True)
 class FilePoints:
@@ -171,9 +169,6 @@ class InitialValues:
         """Go through the keys, but for most of those that are no parts of others."""
         own = self.points.parts() if self.points is not None else ()
         return chain(own, (key for key in self.other if self.point(key) < 0))
-
-
-# The files together: what a name means where, and what must stay.
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,7 @@ from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
 from postproc.files import base_name
 from postproc.language.insert_moves import Splitter
-from postproc.language.language import (
-    Cloner,
-    JobReading,
-    Language,
-    Start,
-)
+from postproc.language.language import Cloner, JobReading, Language, Start
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve

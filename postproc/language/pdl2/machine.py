@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.interpreter import Interpreter, calls_around
 from postproc.language.pdl2.abstract_state import (
     MANY,
@@ -23,12 +23,10 @@ from postproc.language.pdl2.abstract_state import (
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
-from postproc.language.pdl2.side_effects import PURE, circles, invocations, references
+from postproc.language.pdl2.side_effects import circles, list_invoked
 from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
-
-# What the analysis records of each arrival, before it becomes arrays.
 
 Numbers = tuple[float | None, ...]
 _NO_NUMBERS: Numbers = (None,) * 6
@@ -222,10 +220,7 @@ class Machine(Interpreter[Store]):
             own: tuple[ir.Node, ...] = (statement,)
             if ir.divides(statement):
                 own = statement.values if isinstance(statement, ir.Branch) else ()
-            found = [c for c in invocations(*own) if c.name not in PURE]
-            names = {r.name for r in references(*own) if not r.steps}
-            alone = [n for n in names if self.world.is_function(place, n)]
-            found += [ir.FunctionCall(name, ()) for name in sorted(alone)]
+            found = list_invoked(self.world, place, *own)
             known = self._called[id(statement)] = tuple(found)
         return known
 
@@ -233,7 +228,7 @@ class Machine(Interpreter[Store]):
         """Go on with the next cycle of the program that runs; False without one."""
         for one in context.around():
             if one.place is not None and one.place.flow.cycle >= 0:
-                self.enter(one, one.place.flow.cycle, store)
+                self.enter(At(one, one.place.flow.cycle), store)
                 return True
         return False
 

@@ -25,12 +25,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
 from postproc.language.pdl2.program import ProgramLines
-from postproc.language.pdl2.side_effects import (
-    CHANGING,
-    PURE,
-    invocations,
-    references,
-)
+from postproc.language.pdl2.side_effects import CHANGING, PURE, list_invoked
 from postproc.language.pdl2.values import Nothing
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import alike, name_index, number_in_order
@@ -337,9 +332,7 @@ def _calls(
     world: World, place: Place, said: ir.SourceStatement
 ) -> list[ir.FunctionCall]:
     """List the calls in a line, those by a function's name alone too."""
-    found = [c for c in invocations(said) if c.name not in PURE]
-    names = {r.name for r in references(said) if not r.steps}
-    found += [ir.FunctionCall(n, ()) for n in names if world.is_function(place, n)]
+    found = list_invoked(world, place, said)
     if isinstance(said, ir.Instruction):
         found.append(ir.FunctionCall(said.name, said.arguments))
     return found

@@ -233,13 +233,7 @@ COMPUTED = Reason(
 )
 
 
-# What one move statement means at a point of the execution.
-
-_MOTIONS = {
-    "joint": Motion.JOINT,
-    "linear": Motion.LINEAR,
-    "circular": Motion.CIRCULAR,
-}
+_MOTIONS = {"joint": Motion.JOINT, "linear": Motion.LINEAR, "circular": Motion.CIRCULAR}
 _FROM_HERE = frozenset(
     {Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
      Meaning.AWAY, Meaning.ABOUT, Meaning.BY, Meaning.FOR}

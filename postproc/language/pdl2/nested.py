@@ -29,8 +29,6 @@ from postproc.language.text.source import Source
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
-# A field of a record or of a node, as a variable file lists it.
-
 HIDDEN = frozenset({*COMPONENTS, "pos", "aux"})
 """Names of fields that may mean a component too, as in ``rec[1].x``: not read."""
 

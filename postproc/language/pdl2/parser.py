@@ -322,7 +322,6 @@ VALUE_RULES: Mapping[str, Rule] = {
     "uninitialised": lambda c: -1,
 }
 
-# Forms of lines in, what they say out.
 
 LONGEST = 1 << 18  # characters of a form; lines of real programs have some hundreds
 DEEPEST = 200  # operators or parentheses within each other; followed by recursion

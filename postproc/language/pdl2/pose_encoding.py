@@ -72,11 +72,13 @@ class SixNumbers(Dialect):
         """Return the poses (k, 4, 4) [m] that numbers (k, 6) say."""
         return pose_from_record(values)
 
-    def rotate(self, values: Floats, by: Floats) -> Floats:
-        """Turn targets (k, 6) by rotations, next to the angles that they have."""
-        out = np.array(values)
-        out[:, 3:] = angles_near(values[:, 3:], by @ rotation_from_zyz(values[:, 3:]))
-        return out
+    def rotations(self, written: Floats) -> Floats:
+        """Return the rotations of Euler angles (k, 3) [deg]."""
+        return rotation_from_zyz(written)
+
+    def orientations(self, R: Floats, near: Floats) -> Floats:
+        """Return the Euler angles of rotations next to others, (k, 3) [deg]."""
+        return angles_near(near, R)
 
     def flags(
         self, config: Ints, configs: tuple[str, ...], values: Floats

@@ -75,9 +75,6 @@ def read_flow(lines: ProgramLines, rows: Ints, first: int, last: int) -> Control
     return reader.flow(first, last)
 
 
-# Declared variables: a list of names is one declaration, whatever its length.
-
-
 @dataclass(frozen=True, slots=True)
 class Variable:
     """A declared variable or constant.
@@ -222,9 +219,6 @@ class Variables(Mapping[str, Variable]):
         return found
 
 
-# A parsed program: declarations, routines and where each jump leads.
-
-
 @dataclass(frozen=True)
 class Body:
     """A routine or the main part of a program.
@@ -301,8 +295,6 @@ class Program:
         rows = np.flatnonzero(heads)
         return int(self.lines.begin_line[rows[0]]) if len(rows) else 1
 
-
-# Programs from lines: declarations, routines, blocks, and where each jump leads.
 
 _PLAIN = (
     ast.Move, ir.Assignment, ir.Instruction, ast.Transfer, ast.Still, ast.CancelMove

@@ -24,8 +24,6 @@ from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Program
 from postproc.language.visits import Visits
 
-# What a statement or a routine may do, read off its text.
-
 PURE = frozenset(
     "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
     "arm_jntp arm_xtnd pos_comp_idl pos_idl_comp abs sqrt sin cos tan asin acos atan2 "
@@ -121,6 +119,14 @@ def invocations(*nodes: ir.Node | None) -> Iterator[ir.FunctionCall]:
 def references(*nodes: ir.Node | None) -> Iterator[ir.DataObject]:
     """Yield the variables in statements or values."""
     return (part for part in ir.walk(*nodes) if isinstance(part, ir.DataObject))
+
+
+def list_invoked(world: World, place: Place, *nodes: ir.Node) -> list[ir.FunctionCall]:
+    """List the calls in nodes that may have effects, those by a name alone, too."""
+    found = [call for call in invocations(*nodes) if call.name not in PURE]
+    names = {r.name for r in references(*nodes) if not r.steps}
+    alone = sorted(name for name in names if world.is_function(place, name))
+    return found + [ir.FunctionCall(name, ()) for name in alone]
 
 
 def list_changed_arguments(

@@ -4,19 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.language.ir import (
-    Assignment,
-    BlockWord,
-    Branch,
-    DataObject,
-    ElementStep,
-    FunctionCall,
-    Instruction,
-    LabelMark,
-    Operand,
-    SourceStatement,
-    divides,
-)
+from postproc.language import ir
 
 # Statements that declare: programs, routines, variables, types.
 
@@ -38,7 +26,7 @@ class Type:
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramHead(SourceStatement):
+class ProgramHead(ir.SourceStatement):
     """``PROGRAM name``; `arm` is the slot of ``PROG_ARM=n``, -1 where there is none."""
 
     name: str
@@ -46,17 +34,17 @@ class ProgramHead(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class Import(SourceStatement):
+class Import(ir.SourceStatement):
     """``IMPORT 'file'``."""
 
     file: str
 
 
 @dataclass(frozen=True, slots=True)
-class DeclarationSection(SourceStatement):
+class DeclarationSection(ir.SourceStatement):
     """``VAR``, ``CONST``, ``TYPE``, alone or with a declaration."""
 
-    then: SourceStatement | None
+    then: ir.SourceStatement | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +56,7 @@ class FormalParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Routine(SourceStatement):
+class Routine(ir.SourceStatement):
     """``ROUTINE name(..)``; `exported` names the program that holds it, or is ""."""
 
     name: str
@@ -77,50 +65,50 @@ class Routine(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class Declare(SourceStatement):
+class Declare(ir.SourceStatement):
     """``a, b : TYPE (initial)``; the names as they are written."""
 
     names: tuple[str, ...]
     type: Type
-    initial: Operand | None
+    initial: ir.Operand | None
     exported: str
     attributes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Constant(SourceStatement):
+class Constant(ir.SourceStatement):
     """``name = value`` in a CONST section."""
 
     name: str
-    value: Operand
+    value: ir.Operand
 
 
 @dataclass(frozen=True, slots=True)
-class Structure(SourceStatement):
+class Structure(ir.SourceStatement):
     """``name = RECORD | NODEDEF``; its fields follow up to `EndStructure`."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class NodeFields(SourceStatement):
+class NodeFields(ir.SourceStatement):
     """``$MAIN_POS, $LIN_SPD``: standard fields that nodes have, in lower case."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class EndStructure(SourceStatement):
+class EndStructure(ir.SourceStatement):
     """``ENDRECORD``, ``ENDNODEDEF``."""
 
 
 @dataclass(frozen=True, slots=True)
-class Begin(SourceStatement):
+class Begin(ir.SourceStatement):
     """``BEGIN``."""
 
 
 @dataclass(frozen=True, slots=True)
-class End(SourceStatement):
+class End(ir.SourceStatement):
     """``END name``."""
 
     name: str
@@ -130,7 +118,7 @@ class End(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class Move(SourceStatement):
+class Move(ir.SourceStatement):
     """A motion.
 
     Attributes:
@@ -148,33 +136,33 @@ class Move(SourceStatement):
     """
 
     fly: bool
-    arm: Operand | None
+    arm: ir.Operand | None
     trajectory: str
     how: str
-    where: tuple[Operand, ...]
-    via: Operand | None = None
+    where: tuple[ir.Operand, ...]
+    via: ir.Operand | None = None
     frame: str = ""
-    settings: tuple[Assignment, ...] = ()
-    conditions: tuple[Operand | ElementStep, ...] = ()
-    til: tuple[DataObject | FunctionCall, ...] | None = None
+    settings: tuple[ir.Assignment, ...] = ()
+    conditions: tuple[ir.Operand | ir.ElementStep, ...] = ()
+    til: tuple[ir.DataObject | ir.FunctionCall, ...] | None = None
     sync: tuple[Move, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramCall(Instruction):
+class ProgramCall(ir.Instruction):
     """``CALL program``."""
 
 
 @dataclass(frozen=True, slots=True)
-class Transfer(SourceStatement):
+class Transfer(ir.SourceStatement):
     """READ, DECODE, ENCODE, WRITE: `operands` may change unless it is WRITE."""
 
     word: str
-    operands: tuple[Operand, ...]
+    operands: tuple[ir.Operand, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Still(SourceStatement):
+class Still(ir.SourceStatement):
     """A statement that neither moves the arm nor changes a value: WAIT, DELAY, ..
 
     Attributes:
@@ -183,43 +171,43 @@ class Still(SourceStatement):
     """
 
     waits: bool
-    terms: tuple[DataObject | FunctionCall, ...] = ()
+    terms: tuple[ir.DataObject | ir.FunctionCall, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class CancelMove(SourceStatement):
+class CancelMove(ir.SourceStatement):
     """``CANCEL CURRENT FOR ARM[n]``, ``CANCEL ALL``: moves end on their way.
 
     Attributes:
         arms: The arms whose moves end; none: those of the program's arm.
     """
 
-    arms: tuple[Operand, ...] = ()
+    arms: tuple[ir.Operand, ...] = ()
 
 
 # Statements that decide what runs next.
 
 
 @dataclass(frozen=True, slots=True)
-class When(SourceStatement):
+class When(ir.SourceStatement):
     """``WHEN event DO action``; `terms` are the names that the event tells."""
 
-    then: SourceStatement | None
-    terms: tuple[DataObject | FunctionCall, ...] = ()
+    then: ir.SourceStatement | None
+    terms: tuple[ir.DataObject | ir.FunctionCall, ...] = ()
 
 
-def behind(one: SourceStatement | None) -> SourceStatement | None:
+def behind(one: ir.SourceStatement | None) -> ir.SourceStatement | None:
     """Return what follows a label, a CASE, an ELSE or a WHEN on its line, if anything.
 
     None as well for all other statements.
     """
-    if isinstance(one, LabelMark | When | BlockWord | Branch):
+    if isinstance(one, ir.LabelMark | When | ir.BlockWord | ir.Branch):
         return one.then
     return None
 
 
-def action(statement: SourceStatement | None) -> SourceStatement | None:
+def action(statement: ir.SourceStatement | None) -> ir.SourceStatement | None:
     """Return what a line does behind its label, CASE, ELSE or WHEN, if anything."""
-    while isinstance(statement, LabelMark | When) or divides(statement):
+    while isinstance(statement, ir.LabelMark | When) or ir.divides(statement):
         statement = behind(statement)
     return statement

@@ -1,14 +1,23 @@
-"""From the records of the analysis to `Visits`."""
+"""Columns of visits: those of all moves of a program in a few array passes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 
-from postproc.arrays import Indices, Ints, chunks, isin_sorted, release_memory, spans
+from postproc.arrays import (
+    Indices,
+    Interned,
+    Ints,
+    chunks,
+    isin_sorted,
+    release_memory,
+    spans,
+)
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
@@ -18,59 +27,479 @@ from postproc.language.analysis.visit_columns import (
     find_literals,
     to_visits,
 )
+from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import MANY
-from postproc.language.pdl2.columns import Collector
-from postproc.language.pdl2.job import World
-from postproc.language.pdl2.machine import Key, Machine, MoveRun
-from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
+from postproc.language.pdl2.conditions import SettingTable
+from postproc.language.pdl2.job import World, base_variable
+from postproc.language.pdl2.machine import (
+    WRITTEN,
+    Goal,
+    Machine,
+    MoveForm,
+    MoveRun,
+)
+from postproc.language.pdl2.pose_encoding import COMMENTS, PDL2_DIALECT
+from postproc.language.pdl2.program import Program
+from postproc.language.pdl2.values import Nothing, Position
+from postproc.language.text.comment_directives import MEASURE
+from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import number_in_order
 from postproc.language.visits import (
     ELSEWHERE,
     Graph,
     Literals,
+    Meaning,
     Visits,
     ZoneRule,
     texts_of,
 )
 
-# What else depends on the numbers of a target than the moves that go to it.
-
+_COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 _IN_PART = "a target is computed from a part of it"
+MOST_AXES = 12  # auxiliary axes that are told
+_UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read")
 
 
-def find_uses(
-    literals: Literals,
-    slots: Ints,
-    bases: Mapping[int, tuple[int, ...]],
-    literal: Ints,
-    pinned: Mapping[int, str],
-) -> tuple[Literals, Indices]:
-    """Find which literals computed targets move along with, and which must stay.
+_RECURSIVE = Reason(
+    Code.RECURSION, "it stands in a routine that calls itself, which is not followed"
+)
+_AXES_UNKNOWN = Reason(
+    Code.EXTERNAL_AXES, "its auxiliary axes are not known before the program runs"
+)
 
-    Args:
-        literals: m literals.
-        slots: Numbers of every visit's literal, (n, 6), -1 where it has none.
+
+@dataclass
+class ProgramMoves:
+    """All moves of a program.
+
+    Attributes:
+        program: The program.
+        runs: Its runs, in the order of their visits, and the first visit of each.
+        visit: The visits, (n,).
+        row: Rows of the moves in the program, (n,).
+        run: The run of each, (n,).
+        forms: What their forms are.
+        form: The form of each, (n,).
+        point: See `MoveRun`, (n,).
+        first, last: Numbers of reasons that come before and after all others, (n,).
+    """
+
+    program: Program
+    runs: list[tuple[int, MoveRun]]
+
+    def __post_init__(self) -> None:
+        at, runs = zip(*self.runs, strict=True)
+        sizes = np.array([len(run) for run in runs])
+        self.visit: Ints = spans(np.array(at), sizes)
+        self.row: Ints = _together([run.rows for run in runs])
+        self.run: Indices = np.repeat(np.arange(len(runs), dtype=np.int32), sizes)
+        self.point: Ints = _together([run.point for run in runs])
+        numbers = Interned[MoveForm]()
+        self.form: Indices = np.concatenate(
+            [_number_forms(run, numbers) for run in runs]
+        )
+        self.forms = [*numbers]
+        self.first = np.zeros(len(self.row), dtype=np.int32)
+        self.last = np.zeros(len(self.row), dtype=np.int32)
+
+    def of_forms(self, said: Callable[[MoveForm], int]) -> Ints:
+        """Return what is said of every move's form, (n,)."""
+        return np.array([said(form) for form in self.forms])[self.form]
+
+    def list_evaluated(self) -> Iterator[tuple[int, MoveRun, Goal]]:
+        """Yield the moves whose goals were evaluated: index, run, goal."""
+        begin = 0
+        for _, run in self.runs:
+            for k, goal in run.goals.items():
+                yield begin + k, run, goal
+            begin += len(run)
+
+
+def _together(columns: Sequence[Ints]) -> Ints:
+    """Put columns one after the other; one by itself is not copied."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+
+
+def _number_forms(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
+    """Return the numbers of the forms of a run's moves."""
+    if len(run.forms) == 1:
+        (form,) = run.forms.values()
+        return np.full(len(run.rows), numbers[form], dtype=np.int32)
+    table = np.zeros(max(run.forms) + 1, dtype=np.int32)
+    for number, form in run.forms.items():
+        table[number] = numbers[form]
+    return table[run.form]
+
+
+class Collector:
+    """Fills the columns of the visits that a machine has found.
+
+    Attributes:
+        machine: Has followed the program.
+        ordered: Runs of moves and their keys, in program order.
+        offsets: The first visit of every run, and how many there are, (r + 1,).
+        columns: The visits.
         bases: The six numbers that computed targets are made of, by visit.
-        literal: Literal of every visit, (n,), -1 where it has none.
-        pinned: Numbers that must stay, and why.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        """Put runs in order, and make room."""
+        self.machine, world = machine, machine.world
+        self.ordered = sorted(
+            machine.arrivals.items(),
+            key=lambda item: (Point(item[0][0], item[0][1]), item[0][2]),
+        )
+        self.runs = [run for _, run in self.ordered]
+        sizes = [len(run) for run in self.runs]
+        self.offsets = np.cumsum([0, *sizes], dtype=np.int64)
+        texts = [(one.lines.source, one.lines.numbers) for one in world.programs()]
+        if (values := world.variables) is not None:
+            texts.append((values.source, values.lines.numbers))
+        self.numbering = Numbering.of(texts)
+        width, n, axes = PDL2_DIALECT.width, sum(sizes), _most_axes(self.runs, world)
+        self.columns = VisitColumns(n, width, axes, len(self.numbering))
+        self.bases: dict[int, tuple[int, ...]] = {}
+        self.settings = SettingTable(self.columns.conditions)
+        self._setting = np.zeros(n, dtype=np.int32)
+
+    def collect(self) -> Visits:
+        """Put the visits in program order and make arrays of them."""
+        c, machine = self.columns, self.machine
+        self._fill()
+        release_memory(len(c))
+        literals, literal = find_literals(c, self.numbering)
+        literals, follows = self._find_uses(literals, literal)
+        ids = np.array([machine.ids[key] for key, _ in self.ordered], dtype=np.int64)
+        numbers = np.full(machine.next_id, -1, dtype=np.int32)  # the visit of every id
+        own = np.arange(self.offsets[-1], dtype=np.int32)
+        numbers[spans(ids, np.diff(self.offsets))] = own
+        files, graph = machine.world.files, self._graph(numbers)
+        visits = to_visits(c, files, graph, literals, literal, follows, PDL2_DIALECT)
+        return self._mark_pauses(visits, numbers)
+
+    def _find_uses(
+        self, literals: Literals, literal: Indices
+    ) -> tuple[Literals, Indices]:
+        """Find which literals computed targets move along with, and which must stay.
+
+        Args:
+            literals: m literals.
+            literal: Literal of every visit, (n,), -1 where it has none.
+
+        Returns:
+            The literals with what pins them, and for every visit the literal that it
+            moves along with, (n,), -1 where there is none.
+        """
+        slots, pinned = self.columns.slots, self.machine.world.pinned
+        follows = np.full(len(literal), -1, dtype=np.int32)
+        wanted = {-1, *pinned, *chain.from_iterable(self.bases.values())}
+        owner = _visits_of(np.array(sorted(wanted)[1:]), slots, literal)
+        stay = {int(literal[owner[k]]): why for k, why in pinned.items() if k in owner}
+        for visit, base in self.bases.items():
+            at = owner.get(base[0], -1)
+            if at >= 0 and (slots[at] == base).all():
+                follows[visit] = literal[at]
+            else:
+                rows = [int(literal[owner[slot]]) for slot in base if slot in owner]
+                stay |= {row: _IN_PART for row in rows if row not in stay}
+        if stay:
+            literals = replace(literals, pinned=texts_of(len(literals), stay))
+        return literals, follows
+
+    def _mark_pauses(self, visits: Visits, visit: Indices) -> Visits:
+        """Say of which fly points it is not known whether the arm stops there."""
+        ids = self.machine.paused, self.machine.lost
+        paused, lost = ([visit[k] for k in some if k >= 0] for some in ids)
+        unsure = {*lost, *np.intersect1d(paused, visits.graph.pred).tolist()}
+        rows = np.array(sorted(k for k in unsure if k >= 0), dtype=np.int64)
+        rule = visits.zone.rule[rows]
+        exact = (rule == ZoneRule.PASS) | (visits.zone.size_mm[rows] < 0.0)
+        rows = rows[visits.motion.fly[rows] & ~exact]
+        if len(rows) == 0:
+            return visits
+        rules = np.array(visits.zone.rule)
+        rules[rows] = ZoneRule.UNKNOWN
+        return visits.with_columns(rule=rules)
+
+    def _graph(self, visit: Indices) -> Graph:
+        """Translate predecessor ids to visits, in CSR form."""
+        origins = []
+        for run in self.runs:  # the visits that its first move may come from
+            found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
+            if MANY in run.predecessors or id(run.place.body) in self.machine.recursive:
+                found.add(ELSEWHERE)
+            origins.append(sorted(found))
+        return chain_visits(np.diff(self.offsets), origins)
+
+    def _fill(self) -> None:
+        """Fill the visits of all runs."""
+        of_program: dict[int, list[tuple[int, MoveRun]]] = {}
+        for at, run in zip(self.offsets.tolist(), self.runs, strict=False):
+            of_program.setdefault(id(run.place.program), []).append((at, run))
+        for mine in of_program.values():
+            moves = ProgramMoves(mine[0][1].place.program, mine)
+            self._place(moves)
+            self._settings(moves)
+            self._fill_written(moves)
+            self._names(moves)
+            self._points(moves)
+            self._fill_evaluated(moves)
+            self._reasons(moves)
+            self._marks(moves)
+        if self.machine.exhausted:
+            self.columns.reason[:] = self.columns.reasons[TOO_COMPLEX]
+        self.columns.names.settle()
+
+    def _place(self, moves: ProgramMoves) -> None:
+        """Enter where moves stand, and what their forms say."""
+        c, visit, lines = self.columns, moves.visit, moves.program.lines
+        c.file[visit] = self.machine.world.files.index(lines.source.name)
+        c.line[visit] = lines.begin_line[moves.row]
+        c.motion[visit] = moves.of_forms(lambda form: form.motion)
+        c.fly[visit] = moves.of_forms(lambda form: form.fly)
+        c.via[visit] = moves.of_forms(lambda form: form.via)
+
+    def _settings(self, moves: ProgramMoves) -> None:
+        """Enter the settings at moves; WITH may set numbers for them."""
+        index = [self.settings.index(run.settings) for _, run in moves.runs]
+        setting = np.array(index, dtype=np.int64)[moves.run]
+        for number, form in enumerate(moves.forms):
+            if form.overrides:
+                mine = np.flatnonzero(moves.form == number)
+                setting[mine] = self._override_settings(moves, mine, setting[mine])
+        self._setting[moves.visit] = setting
+        self.columns.condition[moves.visit] = self.settings.conditions(setting)
+
+    def _override_settings(
+        self, moves: ProgramMoves, mine: Ints, setting: Ints
+    ) -> Ints:
+        """Return the settings at moves of one form whose WITH sets numbers, (m,)."""
+        lines, overrides = (
+            moves.program.lines,
+            moves.forms[moves.form[mine[0]]].overrides,
+        )
+        names = [name for name, _ in overrides]
+        slots = np.array([slot for _, slot in overrides])
+        numbers = lines.value[lines.first[moves.row[mine]][:, None] + slots]
+        both = np.column_stack([setting, numbers])
+        distinct, which = np.unique(both, axis=0, return_inverse=True)
+        index, unread = [], Nothing("the number cannot be read")
+        for base, *row in distinct.tolist():
+            own = dict(self.settings.get_settings(int(base)))
+            own |= {n: unread if x != x else x for n, x in zip(names, row, strict=True)}
+            index.append(self.settings.index(own))
+        return np.array(index, dtype=np.int64)[which.ravel()]
+
+    def _fill_written(self, moves: ProgramMoves) -> None:
+        """Fill moves to six numbers that stand in them."""
+        c, lines = self.columns, moves.program.lines
+        base = self.machine.world.slot_base[lines.source.name]
+        here = moves.point == WRITTEN
+        for number, form in enumerate(moves.forms):
+            if not form.slots:
+                continue
+            some = np.flatnonzero(here & (moves.form == number))
+            mine = moves.visit[some]
+            for k in chunks(len(some)):
+                first = lines.first[moves.row[some[k]]]
+                numbers = first[:, None] + np.array(form.slots, dtype=np.int32)
+                c.values[mine[k]] = lines.value[numbers]
+                c.slots[mine[k]] = numbers + base
+            c.target[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
+            if form.config is not None:
+                c.config[mine] = self.columns.configs[form.config]
+                c.config_given[mine] = True
+        mine = moves.visit[here]
+        wrong = np.zeros(len(mine), dtype=bool)
+        for k in chunks(len(mine)):
+            wrong[k] = ~np.isfinite(c.values[mine[k]]).all(axis=1)
+        bad = mine[wrong]
+        c.target[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
+        if len(bad):
+            moves.first[np.flatnonzero(here)[wrong]] = self.columns.reasons[_UNREAD]
+        taught = self.machine.world.taught_lines[lines.source.name]
+        if taught:
+            c.taught[mine] = np.isin(c.line[mine], np.array(sorted(taught)))
+
+    def _names(self, moves: ProgramMoves) -> None:
+        """Enter the names of the points that moves go to."""
+        points, names = self.machine.world.initial.points, NameColumn()
+        at = np.flatnonzero(moves.point >= 0)
+        if points is not None and len(at):
+            names = points.entries.name.take(moves.point[at])
+        told = {
+            k: goal.position.name
+            for k, _, goal in moves.list_evaluated()
+            if goal.position
+        }
+        if told:  # among the others, ascending
+            places = np.append(np.array([*told], dtype=np.int64), at)
+            every, order = NameColumn(told.values()), np.argsort(places)
+            every.extend(names)
+            at, names = places[order], every.take(order)
+        self.columns.name[moves.visit[at]] = self.columns.names.of(names)
+
+    def _points(self, moves: ProgramMoves) -> None:
+        """Fill moves to points that the variable file tells, layout by layout."""
+        points = self.machine.world.initial.points
+        some = np.flatnonzero(moves.point >= 0)
+        if points is None or len(some) == 0:
+            return
+        c, entries = self.columns, points.entries
+        rows, visit = moves.point[some], moves.visit[some]
+        for k in chunks(len(some)):
+            c.values[visit[k]] = entries.numbers[rows[k]]
+            c.slots[visit[k]] = entries.slots[rows[k]] + points.base
+        c.taught[visit], c.shared[visit] = points.taught[rows], points.shared[rows]
+        if self.machine.world.start.taught:
+            names = entries.name.take(rows)
+            c.taught[visit] |= [self.is_listed(name) for name in names]
+        written = entries.layout[rows]
+        for number in written[number_in_order(written)[1]].tolist():
+            layout, mine = entries.layouts[number], written == number
+            c.config[visit[mine]] = self.columns.configs[layout.config or ""]
+            c.config_given[visit[mine]] = layout.config is not None
+            joints = layout.kind == "JNTP"
+            c.target[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
+            for column, axis in enumerate(layout.axes):
+                if 1 <= axis <= c.aux.shape[1]:
+                    c.aux[visit[mine], axis - 1] = entries.aux[rows[mine], column]
+            moves.last[some[mine]] = self.columns.reasons[self.aux_problem(layout.axes)]
+
+    def _fill_evaluated(self, moves: ProgramMoves) -> None:
+        c, found = self.columns, [*moves.list_evaluated()]
+        if not found:
+            return
+        index = np.array([k for k, _, _ in found])
+        visit = moves.visit[index]
+        goals = [goal for _, _, goal in found]
+        c.target[visit] = [goal.target for goal in goals]
+        c.values[visit] = np.array([goal.numbers for goal in goals], dtype=float)
+        distances = np.array([goal.distance for goal in goals], dtype=float)
+        if np.isfinite(distances).any():
+            c.distance_mm = np.array(c.distance_mm)
+            c.distance_mm[visit] = distances
+        moves.first[index] = self.columns.reasons.of([goal.reason for goal in goals])
+        for at, k, goal in zip(visit.tolist(), index.tolist(), goals, strict=True):
+            if goal.position is not None:
+                self._position(at, moves.program, goal.target, goal.position)
+                aux = goal.position.aux
+                axes = None if aux is None else tuple(axis for axis, _ in aux)
+                moves.last[k] = self.columns.reasons[self.aux_problem(axes)]
+
+    def _position(
+        self, at: int, program: Program, target: Meaning, position: Position
+    ) -> None:
+        """Fill what is known of the position value that a visit goes to."""
+        c, world = self.columns, self.machine.world
+        c.config[at] = self.columns.configs[position.config or ""]
+        c.config_given[at] = position.config is not None
+        for axis, value in position.aux or ():
+            if 1 <= axis <= c.aux.shape[1] and value is not None:
+                c.aux[at, axis - 1] = value
+        if position.editable and target in (Meaning.POSE, Meaning.JOINTS):
+            c.slots[at] = position.slots
+        elif -1 not in position.slots and target in _COMPUTED:
+            self.bases[at] = position.slots
+        else:
+            world.pin(position, "a target is computed from a part of it")
+        lines = world.taught_lines[program.lines.source.name]
+        inline = not position.name and int(c.line[at]) in lines
+        listed = self.is_listed(position.name)
+        c.taught[at] = position.taught or inline or listed
+        c.shared[at] = position.shared
+
+    def _reasons(self, moves: ProgramMoves) -> None:
+        """Say why moves must not be compensated: many moves, few combinations."""
+        c, runs = self.columns, [run for _, run in moves.runs]
+        whole = Interned[Reason]()
+        kinds: list[Indices]
+        recursive = [id(run.place.body) in self.machine.recursive for run in runs]
+        own = [
+            run.reason or (_RECURSIVE if again else NO_REASON)
+            for run, again in zip(runs, recursive, strict=True)
+        ]
+        kinds = [moves.first, whole.of(own)[moves.run]]
+        kinds += [
+            moves.form,
+            self._setting[moves.visit],
+            c.target[moves.visit],
+            moves.last,
+        ]
+        which, example = _alike(kinds)
+        firsts, of_runs = [*self.columns.reasons], [*whole]
+        reasons = []
+        for first, run, form, setting, target, last in zip(
+            *(kind[example].tolist() for kind in kinds), strict=True
+        ):
+            reason = firsts[first] or of_runs[run] or moves.forms[form].reason
+            problem = self.settings.problem(setting, Meaning(target))
+            why = reason or problem or firsts[last] or self.machine.handler
+            reasons.append(self.columns.reasons[why])
+        c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
+
+    def aux_problem(self, axes: tuple[int, ...] | None) -> Reason:
+        """Return why a target with some auxiliary axes stays, None: not known which."""
+        kinds = self.machine.world.start.aux
+        if axes is None:
+            if kinds and all(kind == "gun" for kind in kinds.values()):
+                return NO_REASON
+            return _AXES_UNKNOWN
+        for axis in axes:
+            kind = kinds.get(axis)
+            if kind is None:
+                text = (
+                    f"auxiliary axis {axis} is not declared: say under [aux] in the "
+                    "cell file whether it is a gun, a track or a positioner"
+                )
+                return Reason(Code.EXTERNAL_AXES, text)
+            if kind != "gun":
+                text = f"auxiliary axis {axis} is a {kind}: it moves arm or part"
+                return Reason(Code.EXTERNAL_AXES, text)
+        return NO_REASON
+
+    def is_listed(self, name: str) -> bool:
+        """Tell whether the cell file says that a point was taught."""
+        taught = self.machine.world.start.taught
+        name = name.lower()
+        return name in taught or base_variable(name) in taught
+
+    def _marks(self, moves: ProgramMoves) -> None:
+        """Enter the ids of moves that are measured."""
+        rows, ids = _find_measured(moves.program)
+        if not ids:
+            return
+        ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
+        at = np.searchsorted(rows, moves.row[ends])
+        for visit, k in zip(moves.visit[ends].tolist(), at.tolist(), strict=True):
+            self.columns.measured[visit] = ids[k]
+
+
+def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
+    """Number the combinations of some columns in the order in which they first stand.
 
     Returns:
-        The literals with what pins them, and for every visit the literal that it moves
-        along with, (n,), -1 where there is none.
+        The combination of every row, (n,), and a row of every combination.
     """
-    follows = np.full(len(literal), -1, dtype=np.int32)
-    wanted = {-1, *pinned, *chain.from_iterable(bases.values())}
-    owner = _visits_of(np.array(sorted(wanted)[1:]), slots, literal)
-    stay = {int(literal[owner[k]]): why for k, why in pinned.items() if k in owner}
-    for visit, base in bases.items():
-        at = owner.get(base[0], -1)
-        if at >= 0 and (slots[at] == base).all():
-            follows[visit] = literal[at]
-        else:
-            rows = [int(literal[owner[slot]]) for slot in base if slot in owner]
-            stay |= {row: _IN_PART for row in rows if row not in stay}
-    if not stay:
-        return literals, follows
-    return replace(literals, pinned=texts_of(len(literals), stay)), follows
+    code = example = np.zeros(len(kinds[0]), dtype=np.int64)
+    for kind in kinds:
+        code, example = number_in_order(code * (int(kind.max()) + 1) + kind)
+    return code, example
+
+
+def _find_measured(program: Program) -> tuple[Ints, list[str]]:
+    """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
+    lines = program.lines
+    marks = [*COMMENTS.marks(lines.source, MEASURE)]
+    if not marks:
+        return np.empty(0, dtype=np.int64), []
+    rows = np.flatnonzero(lines.which(lambda said: isinstance(said, ast.Move)))
+    found: dict[int, str] = {}
+    for line, mark in marks:
+        at = int(np.searchsorted(lines.begin_line[rows], line))
+        if at < len(rows):
+            found.setdefault(int(rows[at]), mark)
+    return np.array([*found], dtype=np.int64), [*found.values()]
 
 
 def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]:
@@ -90,58 +519,7 @@ def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]
     return found
 
 
-# All of it: visits in program order.
-
 MOST_AXES = 12  # auxiliary axes that are told
-
-
-def collect(machine: Machine) -> Visits:
-    """Put the visits in program order and make arrays of them."""
-    ordered = sorted(
-        machine.arrivals.items(),
-        key=lambda item: (Point(item[0][0], item[0][1]), item[0][2]),
-    )
-    runs, world = [run for _, run in ordered], machine.world
-    offsets = np.concatenate([[0], np.cumsum([len(run) for run in runs])])
-    offsets = offsets.astype(np.int64)
-    texts = [(one.lines.source, one.lines.numbers) for one in world.programs()]
-    if (values := world.variables) is not None:
-        texts.append((values.source, values.lines.numbers))
-    numbering = Numbering.of(texts)
-    collector = _collect_visits(machine, runs, offsets, len(numbering))
-    c = collector.columns
-    release_memory(len(c))
-    literals, literal = find_literals(c, numbering)
-    literals, follows = find_uses(
-        literals, c.slots, collector.bases, literal, world.pinned
-    )
-    ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    numbers = np.full(machine.next_id, -1, dtype=np.int32)  # the visit of every id
-    numbers[spans(ids, np.diff(offsets))] = np.arange(offsets[-1], dtype=np.int32)
-    graph = _graph(machine, ordered, offsets, numbers)
-    visits = to_visits(c, world.files, graph, literals, literal, follows, PDL2_DIALECT)
-    return _mark_pauses(visits, machine, numbers)
-
-
-def _collect_visits(
-    machine: Machine, runs: list[MoveRun], offsets: Ints, numbers: int
-) -> Collector:
-    """Fill the columns of all visits.
-
-    Args:
-        machine: Has followed the program.
-        runs: Of moves, in program order.
-        offsets: The first visit of every run, and how many there are, (r + 1,).
-        numbers: How many numbers the files hold.
-    """
-    axes = _most_axes(runs, machine.world)
-    columns = VisitColumns(int(offsets[-1]), PDL2_DIALECT.width, axes, numbers)
-    collector = Collector(machine, columns)
-    collector.fill(zip(offsets.tolist(), runs, strict=False))
-    if machine.exhausted:
-        columns.reason[:] = columns.reasons[TOO_COMPLEX]
-    columns.names.settle()
-    return collector
 
 
 def _most_axes(runs: list[MoveRun], world: World) -> int:
@@ -154,35 +532,3 @@ def _most_axes(runs: list[MoveRun], world: World) -> int:
         used: list[int] = np.unique(points.entries.layout[rows[rows >= 0]]).tolist()
         axes |= {axis for k in used for axis in points.entries.layouts[k].axes}
     return max([0, *(min(axis, MOST_AXES) for axis in axes)])
-
-
-def _mark_pauses(visits: Visits, machine: Machine, visit: Indices) -> Visits:
-    """Say of which fly points it is not known whether the arm stops there."""
-    paused, lost = ([visit[k] for k in ids if k >= 0]
-                    for ids in (machine.paused, machine.lost))  # fmt: skip
-    unsure = {*lost, *np.intersect1d(paused, visits.graph.pred).tolist()}
-    rows = np.array(sorted(k for k in unsure if k >= 0), dtype=np.int64)
-    rule = visits.zone.rule[rows]
-    exact = (rule == ZoneRule.PASS) | (visits.zone.size_mm[rows] < 0.0)
-    rows = rows[visits.motion.fly[rows] & ~exact]
-    if len(rows) == 0:
-        return visits
-    rules = np.array(visits.zone.rule)
-    rules[rows] = ZoneRule.UNKNOWN
-    return visits.with_columns(rule=rules)
-
-
-def _graph(
-    machine: Machine,
-    ordered: list[tuple[Key, MoveRun]],
-    offsets: Ints,
-    visit: Indices,
-) -> Graph:
-    """Translate predecessor ids to visits, in CSR form."""
-    origins = []
-    for _, run in ordered:  # the visits that its first move may come from
-        found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
-        if MANY in run.predecessors or id(run.place.body) in machine.recursive:
-            found.add(ELSEWHERE)
-        origins.append(sorted(found))
-    return chain_visits(np.diff(offsets), origins)

@@ -13,8 +13,6 @@ from postproc.diagnostics import Code
 from postproc.language.analysis.functions import COMPARISONS, apply_function
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
-# What the analysis knows of a value: a number, a text, a position, or why nothing.
-
 Numbers = tuple[float | None, ...]
 
 FARTHEST = 1e6  # [mm] and [deg]: beyond, rounding would hide what is added
@@ -334,9 +332,6 @@ def function(name: str, x: float) -> Value:
     """Return what a built-in function of one number gives (angles in degrees)."""
     found = apply_function(name, x)
     return Nothing("the root of a negative number") if math.isnan(found) else found
-
-
-# Where a reference leads.
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 
 from postproc.language import ir
-from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.program import inside
@@ -55,17 +55,11 @@ RAISED_BY: Mapping[str, tuple[str, ...]] = {
 PATH_ERRORS = frozenset(["err_path_stop", "err_coll_stop", "err_motsup"])
 
 
-@dataclass(frozen=True)
-class HandlerEnd:
-    """A word with which an error handler goes on.
+HandlerEnd = tuple[Numbers, str]
+"""The errors with which a word is reached with which an error handler goes on.
 
-    Attributes:
-        word: retry, trynext, return, raise or exitcycle.
-        numbers: Errors that it is reached with.
-    """
-
-    word: str
-    numbers: Numbers
+That is retry, trynext, return, raise or exitcycle.
+"""
 
 
 @dataclass(frozen=True)
@@ -193,11 +187,11 @@ def _end(
         numbers = common(numbers, _find_errors(one.condition, row, read))
         one = one.statement
     if isinstance(one, ir.Leave) and one.word in LEAVES:
-        yield HandlerEnd(one.word, numbers)
+        yield numbers, one.word
     elif isinstance(one, ir.Instruction) and one.name == EXIT_CYCLE:
-        yield HandlerEnd(EXIT_CYCLE, numbers)
+        yield numbers, EXIT_CYCLE
     elif isinstance(one, ir.JumpTo | ir.NotUnderstood):  # that is not followed
-        yield from (HandlerEnd(word, ANY) for word in LEAVES)
+        yield from ((ANY, word) for word in LEAVES)
 
 
 def _find_errors(condition: ir.Operand, row: int, read: ReadNumber) -> Numbers:
@@ -306,18 +300,27 @@ class ErrorExit:
     Attributes:
         numbers: The errors.
         lost: A handler on the way may have moved the arm or changed modes.
-        context, row: The statement; no context: a cycle ends. Of the routine's own
-            handler the row is counted from the statement that raises the error.
+        at: The statement, None where a cycle ends. Of the routine's own handler the row
+            is counted from the statement that raises the error.
         restarts: The cycle ends and main begins again from where the arm stands.
         own: The handler is that of the routine itself.
     """
 
     numbers: Numbers
     lost: bool
-    context: Context | None = None
-    row: int = -1
-    restarts: bool = False
-    own: bool = False
+    at: At | None
+    restarts: bool
+    own: bool
+
+    def beside(self, at: At) -> At | None:
+        """Return the statement where it is one of the routine that raises the error.
+
+        Args:
+            at: The statement that raises it.
+        """
+        if self.own and self.at is not None and self.at.context is at.context:
+            return at.to(at.row + self.at.row)
+        return None
 
 
 def exits_of(
@@ -334,45 +337,41 @@ def exits_of(
         context: Where the statement stands.
         handlers: What handles the errors of a routine.
     """
-    numbers, lost, row = ANY, False, 0
-    at: Context | None = context
+    numbers, lost = ANY, False
+    at: At | None = At(context, 0)
     while at is not None:
-        here, raised = handlers(at), NO_NUMBERS
+        here, raised = handlers(at.context), NO_NUMBERS
         lost = lost or here.moves
         for number, end in _list_ends(here, numbers):
             if end == "raise":
                 raised = together(raised, number)
             else:
-                own = at is context
-                yield replace(_exit(at, row, end), numbers=number, lost=lost, own=own)
+                own, to = at.context is context, _find_exit(at, end)
+                yield ErrorExit(number, lost, to, end == EXIT_CYCLE, own)
         if not all(clause.listed for clause in here.clauses):
             numbers = raised
-        at, row = caller_of(at)
+        at = caller_of(at.context)
 
 
-def _list_ends(here: ErrorHandlers, numbers: Numbers) -> Iterator[tuple[Numbers, str]]:
+def _list_ends(here: ErrorHandlers, numbers: Numbers) -> Iterator[HandlerEnd]:
     """Yield the words with which handlers go on, and the errors that lead there."""
     for clause in here.clauses:
         taken = clause.numbers if clause.listed else numbers
-        for end in clause.ends:
-            reached = common(taken, end.numbers)
+        for own, word in clause.ends:
+            reached = common(taken, own)
             if reached is None or reached:
-                yield reached, end.word
+                yield reached, word
 
 
-def _exit(at: Context, row: int, word: str) -> ErrorExit:
+def _find_exit(at: At, word: str) -> At | None:
     """Return where a word leads to that ends the handling of an error at a row."""
     if word in ("retry", "trynext"):
-        return ErrorExit(ANY, False, at, row + (word == "trynext"))
-    if word == EXIT_CYCLE:
-        return ErrorExit(ANY, False, restarts=True)
-    caller, called_at = caller_of(at)
-    return ErrorExit(ANY, False, caller, called_at + 1)
+        return at.behind if word == "trynext" else at
+    caller = None if word == EXIT_CYCLE else caller_of(at.context)
+    return caller and caller.behind
 
 
-def caller_of(context: Context) -> tuple[Context | None, int]:
-    """Return where a routine was called, and the row; None for the first one."""
+def caller_of(context: Context) -> At | None:
+    """Return where a routine was called, None for the first one."""
     call = context.call
-    if call.outer.place is None:
-        return None, -1
-    return call.outer, call.at - call.outer.place.offset
+    return None if call.outer.place is None else call.begun_at

@@ -8,12 +8,7 @@ from functools import cached_property
 
 from postproc.arrays import Floats
 from postproc.language import ir
-from postproc.language.insert_moves import (
-    MoveLayout,
-    Splitter,
-    spell,
-    split_arguments,
-)
+from postproc.language.insert_moves import MoveLayout, Splitter, spell, split_arguments
 from postproc.language.rapid.clones import ends_line
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile

@@ -11,7 +11,7 @@ from typing import Any, TypeGuard
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Scope
-from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.task_machine import (
     MOVES,
@@ -19,24 +19,11 @@ from postproc.language.analysis.task_machine import (
     Arrived,
     Effects,
     TaskMachine,
+    scope_at,
 )
 from postproc.language.language import Start
+from postproc.language.rapid import errors
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.errors import (
-    EXIT_CYCLE,
-    PATH_ERRORS,
-    ErrorExit,
-    ErrorHandlers,
-    Numbers,
-    begins_handler,
-    clauses_of,
-    common,
-    exits_of,
-    key_of,
-    may_be_skipped,
-    may_raise,
-    numbers_of,
-)
 from postproc.language.rapid.instructions import (
     BY_NAME,
     MOTIONS,
@@ -91,8 +78,8 @@ class RapidMachine(TaskMachine):
     goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
-    _handlers: dict[tuple[int, int], ErrorHandlers] = field(default_factory=dict)
-    _exits: dict[Context, tuple[ErrorExit, ...]] = field(default_factory=dict)
+    _handlers: dict[tuple[int, int], errors.ErrorHandlers] = field(default_factory=dict)
+    _exits: dict[Context, tuple[errors.ErrorExit, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -115,21 +102,17 @@ class RapidMachine(TaskMachine):
         here = self.begin(frozenset([START]), AT_START)
         if len(mains) != 1:
             here = here.forget()
-            self.say(
-                0, 0, Code.NO_MAIN, "no single PROC main: from where these routines "
-                "are called, and with what settings, is not known. Give the module "
-                "that holds main, with the others of its task in the same folder",
-            )  # fmt: skip
+            self.say(Scope(0, "", "", row=0), Code.NO_MAIN, _NO_MAIN)
         every = [one for own in self.task.routines.values() for one in own]
         traps = [one for one in every if one.rows.head.kind == "trap"]
         if any(map(self.routine_effects, traps)):
             here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
         for routine in found:
-            self.call_routine(routine, self.root, -1, here)
+            self.call_routine(routine, None, here)
         self.follow()
         again = self._next_cycle(here)
         if len(mains) == 1 and again != here:
-            self.call_routine(mains[0], self.root, -1, again)
+            self.call_routine(mains[0], None, again)
             self.follow()
 
     def _next_cycle(self, here: Arrived) -> Arrived:
@@ -152,7 +135,7 @@ class RapidMachine(TaskMachine):
         modal = {name for name, kind in known.items() if kind == "modal"}
         modal -= {*self.task.routines, *STOPPED}
         for routine in (r for own in self.task.routines.values() for r in own):
-            scope, rows = self.task.scope_of(*routine), routine.inside
+            scope, rows = self.task.scope_of(routine), routine.inside
             text = self.texts[routine.file]
             for row in text.where(
                 lambda one: getattr(inside(one), "name", "") in modal,
@@ -160,9 +143,15 @@ class RapidMachine(TaskMachine):
             ):  # fmt: skip
                 one = inside(text.statement(row))
                 if isinstance(one, ir.Instruction):
-                    given = list_set_modes(partial(self._change_modes, one, row, scope))
+                    given = self._list_set(one, scope.at(row))
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
+
+    def _list_set(
+        self, one: ir.Instruction, scope: Scope
+    ) -> frozenset[tuple[str, Any]]:
+        """Return the modes that an instruction sets, whatever holds before it."""
+        return list_set_modes(partial(self._change_modes, one, scope))
 
     def _procedures(self) -> list[TaskRoutine]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -188,14 +177,13 @@ class RapidMachine(TaskMachine):
 
     def handles(self, one: ir.SourceStatement) -> bool:
         """Tell whether a handler begins, see `TaskMachine.handles`."""
-        return begins_handler(one)
+        return errors.begins_handler(one)
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
         if self._handlers_of(context).moves:
             here = replace(
-                here,
-                modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER}),
+                here, modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER})
             )
         return here
 
@@ -207,98 +195,92 @@ class RapidMachine(TaskMachine):
 
     # Errors.
 
-    def _handlers_of(self, context: Context) -> ErrorHandlers:
+    def _handlers_of(self, context: Context) -> errors.ErrorHandlers:
         """Read the error handlers of a routine once."""
-        key = context.place.scope.file, context.place.routine.first
+        place = context.place
+        key = place.scope.file, place.routine.first
         if key not in self._handlers:
-            scope = replace(context.place.scope, given=(), loops=())
+            scope = replace(place.scope, given=(), loops=())
             text = self.texts[scope.file]
 
             def read(operand: ir.Operand | None, row: int) -> str:
-                return key_of(operand, self.task.number(operand, row, scope))
+                return errors.key_of(operand, self.task.number(operand, scope.at(row)))
 
-            clauses = clauses_of(text, context.place.flow, read)
-            rows = context.place.flow.handlers
-            effects, called = self.read_rows(scope, rows, (EXIT_CYCLE,))
+            clauses = errors.clauses_of(text, place.flow, read)
+            rows = place.flow.handlers
+            effects, called = self.read_rows(scope, rows, (errors.EXIT_CYCLE,))
             if moves := bool(effects.union(*map(self.routine_effects, called))):
                 self.beside.add((scope.file, rows.start, rows.stop))
-            self._handlers[key] = ErrorHandlers(clauses, moves)
+            self._handlers[key] = errors.ErrorHandlers(clauses, moves)
         return self._handlers[key]
 
-    def _exits_of(self, context: Context) -> tuple[ErrorExit, ...]:
+    def _exits_of(self, context: Context) -> tuple[errors.ErrorExit, ...]:
         """Find where the program goes on behind errors raised in a routine."""
         if context not in self._exits:
-            self._exits[context] = tuple(exits_of(context, self._handlers_of))
+            self._exits[context] = tuple(errors.exits_of(context, self._handlers_of))
         return self._exits[context]
 
-    def _fail(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
-    ) -> None:
+    def _fail(self, at: At, one: ir.SourceStatement, here: Arrived) -> None:
         """Allow for an error that a statement raises and another routine handles.
 
         The routine's own handler may skip a statement whose operands are not known
         before it runs. Otherwise it changes nothing of how the arm comes there.
         """
-        for way in self._exits_of(context):
-            beside = way.own and way.context is context
+        for way in self._exits_of(at.context):
+            beside = way.beside(at)
             if not self._may_raise(one, way.numbers):
                 continue
             if not beside:
-                self._handle(context, row, way, replace(here, origins=NOWHERE))
-            elif way.row and may_be_skipped(one):
-                self._handle(context, row, way, here)
+                self._handle(at, way, replace(here, origins=NOWHERE))
+            elif beside.row > at.row and errors.may_be_skipped(one):
+                self._handle(at, way, here)
 
-    def _may_raise(self, one: ir.SourceStatement, numbers: Numbers) -> bool:
-        return may_raise(one, numbers, self.task.routines, self.task.declared)
+    def _may_raise(self, one: ir.SourceStatement, numbers: errors.Numbers) -> bool:
+        return errors.may_raise(one, numbers, self.task.routines, self.task.declared)
 
-    def _interrupt(
-        self, context: Context, row: int, one: ir.Instruction, here: Arrived
-    ) -> None:
+    def _interrupt(self, at: At, one: ir.Instruction, here: Arrived) -> None:
         """Allow for an error that ends a move on its way."""
         always = (
             one.name.startswith(PROCESSES) or "procerrrecovery" in self.task.find_calls
         )
-        for way in self._exits_of(context):
-            named = way.numbers is not None and bool(way.numbers & PATH_ERRORS)
+        for way in self._exits_of(at.context):
+            named = way.numbers is not None and bool(way.numbers & errors.PATH_ERRORS)
             if way.own and (named or (always and self._may_raise(one, way.numbers))):
-                self._handle(context, row, way, replace(here, origins=NOWHERE))
+                self._handle(at, way, replace(here, origins=NOWHERE))
 
-    def _handle(
-        self, context: Context, row: int, way: ErrorExit, here: Arrived
-    ) -> None:
+    def _handle(self, at: At, way: errors.ErrorExit, here: Arrived) -> None:
         """Go on behind an error."""
         here = here.forget() if way.lost else here
-        if way.context is context and way.own:
-            self.go_on(context, row + way.row, here)
-        elif way.context is not None:
-            self.go_on(way.context, way.row, here)
+        to = way.beside(at) or way.at
+        if to is not None:
+            self.go_on(to, here)
         elif way.restarts:
             self.restarts.append(here)
         else:
             self.ends.append(here)
 
-    def leave_otherwise(
-        self, context: Context, row: int, one: ir.Leave, here: Arrived
-    ) -> None:
+    def leave_otherwise(self, at: At, one: ir.Leave, here: Arrived) -> None:
         """Go on behind ``RAISE``; behind ``EXIT`` the program stops."""
         if one.word != "raise":
             return
-        number = self.task.number(one.value, row, context.place.scope)
-        raised = numbers_of([one.value], lambda value: key_of(value, number))
-        for way in self._exits_of(context):
-            shared = common(way.numbers, raised)
+        number = self.task.number(one.value, scope_at(at))
+        raised = errors.numbers_of(
+            [one.value], lambda value: errors.key_of(value, number)
+        )
+        for way in self._exits_of(at.context):
+            shared = errors.common(way.numbers, raised)
             if shared is None or shared:
-                self._handle(context, row, way, here)
+                self._handle(at, way, here)
 
     def part_otherwise(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Go on behind ``IF condition statement;``."""
         if isinstance(one, said.CompactIf):
-            holds = self.truth(context, row, one.condition, here)
+            holds = self.truth(at, one.condition, here)
             if holds is False:
                 return here
-            after = self._compact(context, row, one.statement, here)
+            after = self._compact(at, one.statement, here)
             if holds:
                 return after
             return here if after is None else here.join(after)
@@ -307,25 +289,25 @@ class RapidMachine(TaskMachine):
                 self.run_named_beside(_name_procedure(one.procedure))
             else:
                 self._run_all_beside()
-        return super().part_otherwise(context, row, one, here)
+        return super().part_otherwise(at, one, here)
 
-    def may_jump(self, context: Context, row: int, here: Arrived) -> None:
+    def may_jump(self, at: At, here: Arrived) -> None:
         """Begin a cycle as well, see `TaskMachine.may_jump`."""
-        super().may_jump(context, row, here)
-        if EXIT_CYCLE in self.texts[context.place.scope.file].words([row]):
+        super().may_jump(at, here)
+        if errors.EXIT_CYCLE in at.place.text.words([at.row]):
             self.restarts.append(here)
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""
-        for file, _, routine in self._procedures():
-            self.run_beside(file, routine)
+        for routine in self._procedures():
+            self.run_beside(routine)
 
-    def calls_of(self, file: int, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
+    def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return all procedures where a text names the one that is called."""
         inner = inside(one)
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
             return self._procedures()
-        return super().calls_of(file, one)
+        return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a move calls a procedure on its way."""
@@ -338,99 +320,90 @@ class RapidMachine(TaskMachine):
         yield from ((routine.file, row, rows.stop) for row in heads[:1])
 
     def read_visits(
-        self, one: Any, row: int, scope: Scope, here: Arrived | None
+        self, one: Any, scope: Scope, here: Arrived | None
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move, see `TaskMachine.read_visits`."""
         one = inside(one)
         if is_move(one):
             modes, points = (here.modes, here.points) if here else (AT_START, NO_POINTS)
-            yield from self.goals.visits(one, row, scope, modes, points)
+            yield from self.goals.visits(one, scope, modes, points)
 
     def _compact(
-        self, context: Context, row: int, inside: ir.SourceStatement, here: Arrived
+        self, at: At, inside: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
         """Run the statement behind a condition."""
         if isinstance(inside, ir.Assignment):
-            return self.assign_point(context, row, inside, here)
+            return self.assign_point(at, inside, here)
         if type(inside) in _PASSED:
             return here
-        return self.run_one(context, row, inside, here)
+        return self.run_one(at, inside, here)
 
     # What instructions do.
 
-    def carry_out(
-        self, context: Context, row: int, one: ir.Instruction, here: Arrived
-    ) -> Arrived | None:
+    def carry_out(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived | None:
         """Run an instruction; None where it goes on in a routine."""
-        here = self.after_functions(context, row, one, here)
-        name, scope = one.name, context.place.scope
+        here = self.after_functions(at, one, here)
+        name = one.name
         if (given := as_assignment(one, self.task.routines)) is not None:
-            return self.assign_point(context, row, given, here)
+            return self.assign_point(at, given, here)
         if name in MOTIONS and name not in self.task.routines:
-            return self._move(context, row, one, here)
+            return self._move(at, one, here)
         if name in self.task.routines:
-            return self.call_named(context, row, name, here)
+            return self.call_named(at, name, here)
         kind = read_known_instructions().get(name)
         if name in WAITING or self.declares_motionless(name):
             self.pause(here)
-        if name == EXIT_CYCLE:
+        if name == errors.EXIT_CYCLE:
             self.restarts.append(here)
             return None
         if name in STOPPED:
             self.lost |= here.origins
             return here.forget()
         if kind == "modal":
-            there = replace(scope, points=here.points)
-            changed = self._change_modes(one, row, there, here.modes)
+            changed = self._change_modes(one, scope_at(at, here), here.modes)
             return replace(here, modes=changed.allowing())
         if kind in ("still", "modal") or self.declares_motionless(name):
             return here
         if name == BY_NAME:
             self._run_all_beside()
         if kind == "left" and name not in self.start.routines:
-            return self.unknown(context, row, here, _LEFT)
-        return self.outside(context, row, name, here)
+            return self.unknown(at, here, _LEFT)
+        return self.outside(at, name, here)
 
-    def _change_modes(
-        self, one: ir.Instruction, row: int, scope: Scope, modes: Modes
-    ) -> Modes:
+    def _change_modes(self, one: ir.Instruction, scope: Scope, modes: Modes) -> Modes:
         """Carry out an instruction that changes how the moves after it are."""
         return change_modes(
             one.name, one.arguments, modes,
-            lambda operand: self.task.number(operand, row, scope),
-            lambda operand: pose_of(self.task.value(operand, row, scope)),
-            lambda operand: self.goals.load(operand, row, scope),
+            lambda operand: self.task.number(operand, scope),
+            lambda operand: pose_of(self.task.value(operand, scope)),
+            lambda operand: self.goals.load(operand, scope),
         )  # fmt: skip
 
-    def _move(
-        self, context: Context, row: int, one: ir.Instruction, here: Arrived
-    ) -> Arrived:
+    def _move(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived:
         """Record the visits of a move."""
-        self._interrupt(context, row, one, here)
-        after = self.arrive(context, row, one, here)
+        self._interrupt(at, one, here)
+        after = self.arrive(at, one, here)
         (last,) = after.origins
         if math.isnan(self.visits[last].zone_mm):
             after = replace(after, modes=after.modes.settle())
         if one.name in SYNCHRONOUS:
-            return self._synchronous(context, row, one, after)
+            return self._synchronous(at, one, after)
         return after
 
-    def _synchronous(
-        self, context: Context, row: int, one: ir.Instruction, here: Arrived
-    ) -> Arrived:
+    def _synchronous(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived:
         """Allow for the procedure that a move calls while the program runs ahead."""
         placed = [argument.value for argument in one.arguments if not argument.name]
         called = placed[-1] if placed else None
         name = _name_procedure(called) if _is_text(called) else ""
         if self.declares_motionless(name) and name not in self.task.routines:
             return here
-        found = self.task.routine(name, context.place.scope)
+        found = self.task.routine(name, at.place.scope)
         given = None if found is None else self._list_set_modes(found)
         if given is None:
             self.run_named_beside(name)
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
-            here = self.unknown(context, row, here, what)
+            here = self.unknown(at, here, what)
         modes = here.modes.allowing(ANYTHING if given is None else given)
         return replace(here, modes=modes)
 
@@ -440,7 +413,7 @@ class RapidMachine(TaskMachine):
         """Return the modes that a procedure may set; None where it may move the arm."""
         if not self.routine_effects(routine):
             return frozenset()
-        scope, found = self.task.scope_of(*routine), set[tuple[str, Any]]()
+        scope, found = self.task.scope_of(routine), set[tuple[str, Any]]()
         for row in routine.inside:
             one = self.texts[routine.file].statement(row)
             effects, called = self.read_calls(functions_in(one), scope)
@@ -451,9 +424,7 @@ class RapidMachine(TaskMachine):
             if isinstance(one, ir.Instruction) and not own:
                 kind = read_known_instructions().get(one.name)
                 if kind == "modal" and one.name not in STOPPED:
-                    found |= list_set_modes(
-                        partial(self._change_modes, one, row, scope)
-                    )
+                    found |= self._list_set(one, scope.at(row))
                     continue
                 if kind == "still" or self.declares_motionless(one.name):
                     continue
@@ -462,15 +433,15 @@ class RapidMachine(TaskMachine):
         return frozenset(found)
 
     def after_functions(
-        self, context: Context, row: int, one: ir.SourceStatement, here: Arrived
+        self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do, and for its errors."""
         for name in functions_in(one):
             if name in WAITING and name not in self.task.routines:
                 self.pause(here)
             still = name in STILL_FUNCTIONS or self.declares_motionless(name)
-            here = self.call_function(context, row, name, still, here)
-        self._fail(context, row, one, here)
+            here = self.call_function(at, name, still, here)
+        self._fail(at, one, here)
         return here
 
     # What a routine may do, read off its text.
@@ -496,6 +467,11 @@ class RapidMachine(TaskMachine):
         return known or name in STILL_FUNCTIONS or self.declares_motionless(name)
 
 
+_NO_MAIN = (
+    "no single PROC main: from where these routines are called, and with what "
+    "settings, is not known. Give the module that holds main, with the others of its "
+    "task in the same folder"
+)
 _LEFT = "may move the arm, or change how it moves, in a way that is not followed"
 _TRAP = Reason(
     Code.BESIDE_PROGRAM,

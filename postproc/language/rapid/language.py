@@ -9,29 +9,19 @@ from pathlib import Path
 
 from postproc.arrays import Floats
 from postproc.files import FolderListing
+from postproc.language import language
 from postproc.language.analysis.task_language import TaskLanguage, check_routines
 from postproc.language.analysis.task_machine import follow
 from postproc.language.insert_moves import Splitter
-from postproc.language.language import (
-    Archive,
-    Cloner,
-    JobReading,
-    Start,
-)
 from postproc.language.measuring_program import MeasuringProgram
-from postproc.language.rapid.backup import (
-    modules_beside,
-    read_backup,
-    read_mounted_arms,
-    system_modules,
-)
+from postproc.language.rapid import backup
 from postproc.language.rapid.clones import RapidCloner
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.symbols import RapidTask, other_tasks
-from postproc.language.rapid.to_visits import visits_of
+from postproc.language.rapid.to_visits import RapidCollector
 from postproc.language.text.blocks import read_once
 from postproc.language.text.source import Source
 
@@ -60,23 +50,23 @@ class Rapid(TaskLanguage):
     def read(
         self,
         sources: Sequence[Source],
-        start: Start,
+        start: language.Start,
         known: Sequence[RapidFile] = (),
-    ) -> JobReading:
+    ) -> language.JobReading:
         """Read the modules of a task, the one with main first; see `Language.read`."""
         task, beside = _tasks(sources, start, known)
         files = [*task.files, *beside]
         machine = follow(lambda: RapidMachine.of(task, start, beside))
-        visits = visits_of(machine)
+        visits = RapidCollector(machine).collect()
         system = frozenset(f.text.source.name for f in task.files if f.is_system)
         own = (d for file in task.files for d in file.diagnostics)
         odd = (d for d in own if d.file not in system)
         found = self.report(machine, visits, files, odd, ("main", "module"))
         return replace(found, untouched=system)
 
-    def cloner(self, sources: Sequence[Source]) -> Cloner:
+    def cloner(self, sources: Sequence[Source]) -> language.Cloner:
         """Parse the modules of a task to clone points in them."""
-        task, beside = _tasks(sources, Start())
+        task, beside = _tasks(sources, language.Start())
         cloner = RapidCloner(task)
         cloner.take_words(beside)  # data of one name may be shared with them
         return cloner
@@ -85,7 +75,7 @@ class Rapid(TaskLanguage):
         """Parse the modules of a task to put points on the ways of its moves."""
         from postproc.language.rapid.insert_moves import RapidSplitter
 
-        task, beside = _tasks(sources, Start())
+        task, beside = _tasks(sources, language.Start())
         return RapidSplitter(task, tuple(beside))
 
     def reads(
@@ -95,15 +85,15 @@ class Rapid(TaskLanguage):
         listing: FolderListing | None = None,
     ) -> tuple[Path, ...]:
         """Return the system modules of the task, and the modules of others."""
-        return (*system_modules(program), *modules_beside(program))
+        return (*backup.system_modules(program), *backup.modules_beside(program))
 
-    def read_archive(self, folder: Path) -> Archive | None:
+    def read_archive(self, folder: Path) -> language.Archive | None:
         """Read ``MOC.cfg`` of a backup."""
-        return read_backup(folder)
+        return backup.read_backup(folder)
 
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""
-        return tuple((arm.name, arm.pose) for arm in read_mounted_arms(program))
+        return tuple((arm.name, arm.pose) for arm in backup.read_mounted_arms(program))
 
     def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
         """Write joint moves that stop, with comments ``MEASURE``."""
@@ -116,7 +106,7 @@ LANGUAGE = Rapid
 
 
 def _tasks(
-    sources: Sequence[Source], start: Start, known: Sequence[RapidFile] = ()
+    sources: Sequence[Source], start: language.Start, known: Sequence[RapidFile] = ()
 ) -> tuple[RapidTask, list[RapidFile]]:
     """Read the task of a program, and the files of the tasks beside it.
 

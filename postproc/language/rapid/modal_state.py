@@ -224,9 +224,7 @@ def _ends(name: str, which: str, why: Reason) -> bool:
     return name not in ONE_OF_MANY or why.about == which != _ANY
 
 
-def list_set_modes(
-    change: Callable[[Modes], Modes],
-) -> frozenset[tuple[str, Any]]:
+def list_set_modes(change: Callable[[Modes], Modes]) -> frozenset[tuple[str, Any]]:
     """Return the modes that an instruction sets, whatever holds before it.
 
     Args:

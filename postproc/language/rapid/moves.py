@@ -12,11 +12,8 @@ import numpy as np
 from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
-    Points,
-    Scope,
-)
+from postproc.language.analysis import goals
+from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
@@ -24,21 +21,10 @@ from postproc.language.analysis.found_visits import (
     explain_disagreement,
     not_reached,
 )
-from postproc.language.analysis.goals import (
-    AT_RUN_TIME,
-    COMPUTED,
-    RUN_TIME,
-    GoalReader,
-    ReadShift,
-    locate_numbers,
-)
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
 from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
-from postproc.language.rapid.pose_encoding import (
-    RAPID_DIALECT,
-    WIDTH,
-)
+from postproc.language.rapid.pose_encoding import RAPID_DIALECT, WIDTH
 from postproc.language.rapid.symbols import SHIFTS, RapidTask
 from postproc.language.shifts import IDENTITY, Pose, Shift, flat
 from postproc.language.visits import Meaning
@@ -147,69 +133,58 @@ class Goals:
     _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
 
     def visits(
-        self,
-        one: ir.Instruction,
-        row: int,
-        scope: Scope,
-        modes: Modes,
-        points: Points,
+        self, one: ir.Instruction, scope: Scope, modes: Modes, points: Points
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
         watched = points.watch()
         there = replace(scope, points=watched)
-        tool, wobj, zone, speed = self._conditions(one, ends, row, there)
+        tool, wobj, zone, speed = self._conditions(one, ends, there)
         motion = _motion(one.name, signature)
         start = replace(scope, points=points)
-        reader = RapidGoal(self.task, row, start, signature.joints, self._slots)
+        reader = RapidGoal(self.task, start, signature.joints, self._slots)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
-        total, untold = self._total(one, row, there)
+        total, untold = self._total(one, there)
         why = why or untold
         for via in (True, False) if signature.via >= 0 else (False,):
             goal = reader.end(ends[via])
             if not (via or signature.reaches):
                 goal = not_reached(goal, why)
             yield RapidVisit(
-                scope, row, motion, via, goal, modes, why=why,
+                scope, motion, via, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
                 taken=watched.given,
             )  # fmt: skip
 
-    def load(
-        self, operand: ir.Operand | None, row: int, scope: Scope
-    ) -> tuple[float, ...]:
+    def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
         """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
 
         ``load0`` and other loads up to a hundredth of a kilogram are no load.
         """
-        operand, row, scope = self.task.behind(operand, row, scope)
+        operand, scope = self.task.behind(operand, scope)
         if isinstance(operand, ir.DataObject) and operand.name == "load0":
             if not operand.steps and "load0" not in self.task.declared:
                 return EMPTY_HAND
-        found = load_of(self.task.value(operand, row, scope))
+        found = load_of(self.task.value(operand, scope))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
     def _total(
-        self, one: ir.Instruction, row: int, scope: Scope
+        self, one: ir.Instruction, scope: Scope
     ) -> tuple[tuple[float, ...], Reason]:
         r"""Read ``\TLoad``: all that the arm carries, and why that is not known."""
         given = [argument for argument in one.arguments if argument.name == "tload"]
         if not given:
             return (), NO_REASON
-        found = self.load(given[0].value, row, scope)
+        found = self.load(given[0].value, scope)
         if not found or given[0].passed_on:
             return (), _LOAD_UNKNOWN
         return (() if found == EMPTY_HAND else found), NO_REASON
 
     def _conditions(
-        self,
-        one: ir.Instruction,
-        ends: Sequence[ir.Operand | None],
-        row: int,
-        scope: Scope,
+        self, one: ir.Instruction, ends: Sequence[ir.Operand | None], scope: Scope
     ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
         """Read tool, work object, zone [mm] and speed [m/s] of a move.
 
@@ -220,10 +195,10 @@ class Goals:
             value is None or (isinstance(value, ir.DataObject) and not value.steps)
             for value in others
         ) and not any(self._is_assigned(value) for value in others)
-        key = id(one), replace(scope, points=NO_POINTS)
+        key = id(one), replace(scope, points=NO_POINTS, row=-1)
         if named and key in self._known:
             return self._known[key][1]
-        arguments = _Arguments(self.task, one.arguments, row, scope)
+        arguments = _Arguments(self.task, one.arguments, scope)
         zone = np.nan if one.name in AT_A_STOP else arguments.zone()
         operand = arguments.option("wobj")
         wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
@@ -246,9 +221,9 @@ class Goals:
         self, kind: str, operand: ir.Operand, arguments: _Arguments
     ) -> FrameOfMove:
         """Read a tool or a work object, by name once for each place it may mean."""
-        found, row, scope = self.task.behind(operand, arguments.row, arguments.scope)
+        found, scope = self.task.behind(operand, arguments.scope)
         operand = operand if found is None else found
-        arguments = replace(arguments, row=row, scope=scope)
+        arguments = replace(arguments, scope=scope)
         if isinstance(operand, ir.DataObject) and not operand.steps:
             if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
@@ -264,12 +239,10 @@ class Goals:
         self, kind: str, operand: ir.Operand, arguments: _Arguments
     ) -> FrameOfMove:
         name = operand.name if isinstance(operand, ir.DataObject) else f"the {kind}"
-        found = self.task.value(operand, arguments.row, arguments.scope)
+        found = self.task.value(operand, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            there = RapidGoal(
-                self.task, arguments.row, arguments.scope, False, self._slots
-            )
+            there = RapidGoal(self.task, arguments.scope, False, self._slots)
             why = there.explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
@@ -282,7 +255,7 @@ FLANGE = FrameOfMove(IDENTITY, True)
 
 
 @dataclass(frozen=True)
-class RapidGoal(GoalReader):
+class RapidGoal(goals.GoalReader):
     """Reads the ends of one move.
 
     Attributes:
@@ -307,9 +280,9 @@ class RapidGoal(GoalReader):
         if own != parts or tuple(map(len, own)) != counts:
             return None
         numbers = [one for part in own[:-1] for one in part]
-        file, slots = locate_numbers(numbers, WIDTH)
+        file, slots = goals.locate_numbers(numbers, WIDTH)
         goal = self._goal_of([x.value for x in numbers], [x.value for x in own[-1]])
-        why = goal.why or (NO_REASON if file >= 0 else COMPUTED)
+        why = goal.why or (NO_REASON if file >= 0 else goals.COMPUTED)
         return replace(goal, file=file, slots=slots, why=why)
 
     def _goal_of(self, numbers: list[float], outside: list[float]) -> FoundGoal:
@@ -330,7 +303,7 @@ class RapidGoal(GoalReader):
             slots, count = self.slots[id(operand)][1], 6 if self.joints else 11
             if len(slots) == count + 6:
                 text = self.task.files[self.here.file].text
-                at = [int(text.first[self.row]) + slot for slot in slots]
+                at = [int(text.first[self.here.row]) + slot for slot in slots]
                 values = text.value[at].tolist()
                 found = self._goal_of(values[:count], values[count:])
                 if np.isfinite(values).all() and not found.why:
@@ -345,25 +318,25 @@ class RapidGoal(GoalReader):
         if operand.name in self.task.routines or self.joints:
             return None
         name, arguments = operand.name, operand.arguments
-        by = self.task.read_shift(arguments, self.row, self.here)
+        by = self.task.read_shift(arguments, self.here)
         if by is None:
-            return self.unknown(AT_RUN_TIME)
+            return self.unknown(goals.AT_RUN_TIME)
         turns = {one.name: one.value for one in arguments}
         placed = [one.value for one in arguments if not one.name]
         base = replace(self, joints=False).goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
-        first = int(self.task.files[self.here.file].text.first[self.row])
+        first = int(self.task.files[self.here.file].text.first[self.here.row])
         slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
         own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
         if base.target != Meaning.POSE or np.isnan(by).any():
-            return self.apply_shift(base, ReadShift(own=own, shifts=shifts))
+            return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
         shift = Shift(SHIFTS[name], by, base.values)
         # x, y, z, and all angles that are there, must be written as numbers.
         given = [*written[:3], *(one for one in written[3:] if one is not None)]
         if not all(isinstance(one, ir.Num) for one in given):
             slots = [-1] * len(slots)
-        return self.apply_shift(base, ReadShift(
+        return self.apply_shift(base, goals.ReadShift(
             shift, self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
             shifts=shifts, turned=turned,
         ))  # fmt: skip
@@ -379,11 +352,11 @@ class RapidGoal(GoalReader):
             code = Code.NO_VALUE
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
-            text = f"may be changed by another task at any time: {RUN_TIME}"
+            text = f"may be changed by another task at any time: {goals.RUN_TIME}"
         elif self.task.constant(name, self.here) is None:
-            text = f"may be changed by the program: {RUN_TIME}"
+            text = f"may be changed by the program: {goals.RUN_TIME}"
         else:
-            text = f"has an element or value that is not known: {RUN_TIME}"
+            text = f"has an element or value that is not known: {goals.RUN_TIME}"
         return Reason(code, f"{name} {text}")
 
     def explain_pinned(self, name: str, file: int) -> str:
@@ -412,12 +385,11 @@ class _Arguments:
     Attributes:
         task: The modules.
         arguments: All of them.
-        row, scope: Where the move stands.
+        scope: Where the move stands.
     """
 
     task: RapidTask
     arguments: Sequence[ir.Argument]
-    row: int
     scope: Scope
 
     def option(self, name: str) -> ir.Operand | None:
@@ -435,7 +407,7 @@ class _Arguments:
         return found[0] if len(found) == 1 else None
 
     def _type(self, operand: ir.Operand | None) -> str:
-        operand, _, scope = self.task.behind(operand, self.row, self.scope)
+        operand, scope = self.task.behind(operand, self.scope)
         if not isinstance(operand, ir.DataObject):
             return ""
         found = self.task.datum(operand.name, scope)
@@ -449,9 +421,9 @@ class _Arguments:
 
     def _find_argument(self, type_: str) -> tuple[ir.DataObject | None, _Arguments]:
         """Return the only argument of a type, and the arguments where it stands."""
-        found = self.task.behind(self.of_type(type_), self.row, self.scope)
+        found = self.task.behind(self.of_type(type_), self.scope)
         named = found[0] if isinstance(found[0], ir.DataObject) else None
-        return named, replace(self, row=found[1], scope=found[2])
+        return named, replace(self, scope=found[1])
 
     def is_built_in(self, name: str) -> bool:
         """Tell whether a name is the controller's: no data, no parameter has it."""
@@ -466,7 +438,7 @@ class _Arguments:
         operand, there = self._find_argument("zonedata")
         if size is not None:
             fine = operand is not None and operand.name == "fine"
-            own = self.task.number(size, self.row, self.scope)
+            own = self.task.number(size, self.scope)
             return own if own >= 0.0 and not fine else UNKNOWN_ZONE
         if operand is None:
             return UNKNOWN_ZONE
@@ -475,7 +447,7 @@ class _Arguments:
         usual = _ZONE.match(operand.name)
         if usual and there.is_built_in(operand.name):
             return float(usual[1]) or Z0
-        found = self.task.value(operand, there.row, there.scope)
+        found = self.task.value(operand, there.scope)
         if isinstance(found, tuple) and len(found) >= 2:
             stops, tcp = found[:2]
             if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
@@ -486,14 +458,14 @@ class _Arguments:
         """Return the speed along a path [m/s], NaN where it is not known."""
         own = self.option("v")
         if own is not None:
-            return self.task.number(own, self.row, self.scope) / 1000.0
+            return self.task.number(own, self.scope) / 1000.0
         operand, there = self._find_argument("speeddata")
         if operand is None:
             return np.nan
         usual = _SPEED.match(operand.name)
         if usual and there.is_built_in(operand.name):
             return float(usual[1]) / 1000.0
-        found = self.task.value(operand, there.row, there.scope)
+        found = self.task.value(operand, there.scope)
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan

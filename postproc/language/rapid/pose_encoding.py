@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.pose_encoding import WIDEST, Dialect, Terms
 from postproc.language.text.comment_directives import Comments
-from postproc.robot.pose import MM
 
 MM_DECIMALS, QUATERNION_DECIMALS, JOINT_DECIMALS = 3, 6, 5
 HEADS = ("x", "y", "z", "q1", "q2", "q3", "q4", "cf1", "cf4", "cf6", "cfx")
 WIDTH = len(HEADS)
-ORIENTATION, FLAGS = slice(3, 7), slice(7, 11)
 COMMENTS = Comments("!", '"')
 COUNTED = (0, 3, 5)  # joints whose quarter turns are counted
 QUARTER = np.pi / 2
@@ -69,6 +68,7 @@ class RapidNumbers(Dialect):
     flag_joints: tuple[int, ...] = COUNTED
     flag_step: float = QUARTER
     flag_columns: tuple[int, ...] = (7, 8, 9, 10)
+    orientation: ClassVar = slice(3, 7)
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
         *(QUATERNION_DECIMALS,) * 4,
@@ -81,23 +81,15 @@ class RapidNumbers(Dialect):
         """Return numbers that none of a pose is longer than, see `Dialect.widest`."""
         return (WIDEST,) * 3 + (-1.0,) * 8
 
-    def poses(self, values: Floats) -> Floats:
-        """Return the poses (k, 4, 4) [m] that numbers (k, 11) say."""
-        values = np.asarray(values, dtype=float)
-        T = np.zeros((*values.shape[:-1], 4, 4))
-        T[..., :3, :3] = rotation_from_quaternion(values[..., ORIENTATION])
-        T[..., :3, 3] = values[..., :3] * MM
-        T[..., 3, 3] = 1.0
-        return T
+    def rotations(self, written: Floats) -> Floats:
+        """Return the rotations of quaternions (.., 4)."""
+        return rotation_from_quaternion(written)
 
-    def rotate(self, values: Floats, by: Floats) -> Floats:
-        """Turn targets (k, 11) by rotations; quaternions keep their sign."""
-        out, written = np.array(values), values[:, ORIENTATION]
-        new = quaternion_from_rotation(by @ rotation_from_quaternion(written))
-        away = np.einsum("kc,kc->k", new, written) < 0.0
-        new[away] *= -1.0
-        out[:, ORIENTATION] = new
-        return out
+    def orientations(self, R: Floats, near: Floats) -> Floats:
+        """Return quaternions (k, 4) that keep the sign of others."""
+        new = quaternion_from_rotation(R)
+        new[np.einsum("kc,kc->k", new, near) < 0.0] *= -1.0
+        return new
 
     def flags(
         self, config: Ints, configs: tuple[str, ...], values: Floats
@@ -114,13 +106,6 @@ class RapidNumbers(Dialect):
         turns = np.full((len(values), 3), np.nan)
         turns[:, 0], turns[:, 1] = np.floor((cf4 + 2) / 4), np.floor((cf6 + 2) / 4)
         return slot, turns
-
-    def flag_words(self, config: str, values: Floats) -> str:
-        """Spell confdata as flags, see `Dialect.flag_words`."""
-        slot, turns = self.flags(np.zeros(1, dtype=np.int64), (config,), values[None])
-        words = [w for w, bit in (("S", 2), ("E", 1), ("W", 4)) if slot[0] & bit]
-        said = [f"T{k + 1}:{t:g}" for k, t in enumerate(turns[0]) if t == t]
-        return " ".join([*words, *said])
 
     def count_flags(self, values: Floats, q: Floats) -> Floats:
         """Count the quarter turns of new poses, see `Dialect.count_flags`."""

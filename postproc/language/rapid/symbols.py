@@ -119,12 +119,11 @@ class RapidTask(TaskSymbols[RapidFile]):
         uses.read |= self.odd_words
 
     def bind(
-        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, row: int,
-        there: Scope,
-    ) -> Scope | None:  # fmt: skip
+        self, routine: TaskRoutine, call: ir.Instruction | ir.FunctionCall, there: Scope
+    ) -> Scope | None:
         """Add no argument where data are changed by their names in texts."""
-        bound = super().bind(routine, call, row, there)
-        return self.scope_of(*routine) if self.sets_by_string and bound else bound
+        bound = super().bind(routine, call, there)
+        return self.scope_of(routine) if self.sets_by_string and bound else bound
 
     def is_taught(self, name: str, found: Value | None) -> bool:
         """Return True if data were taught, by the cell or a comment on their line.
@@ -175,7 +174,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     def _first_value(self, file: int, datum: Datum) -> Value | None:
         """Return what data hold at first, without where it is written."""
         there = self.scope_of_datum(file, datum)
-        return without_places(self.value(datum.value, datum.row, there))
+        return without_places(self.value(datum.value, there))
 
     @cached_property
     def persistents(self) -> frozenset[str]:
@@ -229,16 +228,14 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     # Offs and RelTool.
 
-    def apply(
-        self, call: ir.FunctionCall, row: int, here: Scope, depth: int
-    ) -> Value | None:
+    def apply(self, call: ir.FunctionCall, here: Scope, depth: int) -> Value | None:
         """Evaluate Offs and RelTool, too."""
         if call.name not in SHIFTS:
-            return super().apply(call, row, here, depth)
-        by = self.read_shift(call.arguments, row, here)
+            return super().apply(call, here, depth)
+        by = self.read_shift(call.arguments, here)
         if by is None or depth > DEEPEST or any(map(math.isnan, by)):
             return None
-        base = self.value(call.arguments[0].value, row, here, depth + 1)
+        base = self.value(call.arguments[0].value, here, depth + 1)
         own = [one.value for one in list_leaves(base) if isinstance(one, WrittenNumber)]
         if not isinstance(base, tuple) or len(base) != 4 or len(own) != 17:
             return None
@@ -248,7 +245,7 @@ class RapidTask(TaskSymbols[RapidFile]):
         return (place, turn, *base[2:])
 
     def read_shift(
-        self, arguments: Sequence[ir.Argument], row: int, here: Scope
+        self, arguments: Sequence[ir.Argument], here: Scope
     ) -> tuple[float, ...] | None:
         """Return how far Offs or RelTool shift [mm], then turn about x, y, z [deg].
 
@@ -259,10 +256,10 @@ class RapidTask(TaskSymbols[RapidFile]):
         if len(placed) != 4:
             return None
         angles = [
-            self.number(turns[axis], row, here) if axis in turns else 0.0
+            self.number(turns[axis], here) if axis in turns else 0.0
             for axis in ("rx", "ry", "rz")
         ]
-        return (*(self.number(one, row, here) for one in placed[1:]), *angles)
+        return (*(self.number(one, here) for one in placed[1:]), *angles)
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)

@@ -23,7 +23,7 @@ from postproc.language.rapid.moves import (
 )
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.shifts import Pose
-from postproc.language.visits import Meaning, Visits
+from postproc.language.visits import Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -44,23 +44,30 @@ _SHIFT = Reason(
 )
 
 
-def visits_of(machine: RapidMachine) -> Visits:
-    """Put the arrivals into the order of the program, as columns."""
-    base = cell_pose(machine.start.base)
-    placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
-    stops = machine.find_unsure_stops()
-    paused = {id(machine.visits[k]) for k in stops if k >= 0}
+class RapidCollector(to_visits.TaskCollector):
+    """Makes the visits of a RAPID task."""
 
-    def arrive(v: RapidVisit) -> Arrival:
+    dialect = RAPID_DIALECT
+
+    def __init__(self, machine: RapidMachine) -> None:
+        """Find where the arm may stop although a zone is written."""
+        super().__init__(machine)
+        self.base = cell_pose(machine.start.base)
+        stops = machine.find_unsure_stops()
+        self.paused = {id(machine.visits[k]) for k in stops if k >= 0}
+        self.placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
+
+    def arrive(self, v: RapidVisit) -> Arrival:
+        """Say what an arrival is carried out with."""
         key = v.wobj, v.modes.shift
-        if key not in placed:
-            placed[key] = pose = v.wobj.pose if v.modes.shift != UNKNOWN_SHIFT else ()
+        if key not in self.placed:
+            pose = v.wobj.pose if v.modes.shift != UNKNOWN_SHIFT else ()
             if pose and v.modes.shift != NO_SHIFT:
-                placed[key] = compose_poses(pose, pose_of_numbers(v.modes.shift))
-        conditions = _conditions(v, base, placed[key], id(v) in paused)
+                pose = compose_poses(pose, pose_of_numbers(v.modes.shift))
+            self.placed[key] = pose
+        paused = id(v) in self.paused
+        conditions = _conditions(v, self.base, self.placed[key], paused)
         return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE)
-
-    return to_visits.visits_of(machine, RAPID_DIALECT, arrive)
 
 
 def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Conditions:

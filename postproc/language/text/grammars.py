@@ -16,8 +16,6 @@ import lark
 from postproc.files import replace_file
 from postproc.operating_system import is_private
 
-# The grammars, and parsers of them.
-
 _PACKAGE = Path(__file__).resolve().parents[2]
 _OPTIONS = {"parser": "lalr", "lexer": "contextual", "maybe_placeholders": False}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Indices
+from postproc.arrays import Floats, Indices
 from postproc.language.text.source import NumberSpans
 from postproc.language.text.symbol_column import NameColumn
 
@@ -59,42 +59,6 @@ def scan_lines(data: bytes, line_starts: Indices) -> ScannedLines:
     return ScannedLines(
         tuple(masks), *by_line, NumberSpans(*places), value, *names, tuple(unterminated)
     )
-
-
-@dataclass(frozen=True)
-class RescannedLines:
-    """A text whose n lines are those of another, but for what m numbers are worth.
-
-    Attributes:
-        added: Line (from 0) of comment alone that the other one has not, -1: none.
-        numbers, value: As in `ScannedLines`.
-        changed: Which numbers are written otherwise, (m,).
-    """
-
-    added: int
-    numbers: NumberSpans
-    value: Floats
-    changed: Bools
-
-
-def rescan_lines(
-    before: tuple[bytes, Indices], after: tuple[bytes, Indices], count: int
-) -> RescannedLines | None:
-    """Scan a text that should differ from another in numbers alone.
-
-    Args:
-        before: The other text, and the offset of every line.
-        after: The text, likewise.
-        count: How many numbers the other one holds.
-
-    Returns:
-        What is in it, None where a mask or a comment differs, or a string has no end.
-    """
-    found = _native.rescan_lines(*before, *after, count)
-    if found is None:
-        return None
-    added, places, value, changed = found
-    return RescannedLines(added, NumberSpans(*places), value, changed)
 
 
 def mask_of(form: str, names: tuple[str, ...]) -> str:

@@ -11,7 +11,6 @@ import numpy as np
 from postproc import _native
 from postproc.arrays import Bools, Ints, spans
 from postproc.exceptions import ProgramError
-from postproc.language.text.lexer import rescan_lines
 from postproc.language.text.source import NumberSpans, Source
 from postproc.language.text.statement_table import Statements
 from postproc.language.text.templates import find_shapes, parse_shapes
@@ -45,9 +44,6 @@ def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[
     shapes, shape = find_shapes(forms, form, at, name, names)
     said, numbers = parse_shapes(shapes, parse), NumberSpans(*places)
     return Statements(source, said, shape.astype(np.int32), line, first, numbers, value)
-
-
-# The lines of a text that was read before, with other numbers.
 
 
 @dataclass(frozen=True)
@@ -86,18 +82,18 @@ def reread_lines(source: Source, before: Statements[T]) -> RereadLines[T] | None
     Returns:
         Its lines; None where they say anything else, or a string does not end.
     """
-    old = before.source
-    found = rescan_lines(
-        (old.data, old.line_starts), (source.data, source.line_starts),
-        len(before.numbers),
-    )  # fmt: skip
+    old, count = before.source, len(before.numbers)
+    found = _native.rescan_lines(
+        old.data, old.line_starts, source.data, source.line_starts, count
+    )
     if found is None:
         return None
+    added, places, value, changed = found
     line = before.begin_line
-    if found.added >= 0:
-        line = line + (line > found.added)
+    if added >= 0:
+        line = (line + (line > added)).astype(np.int32, copy=False)
+    numbers = NumberSpans(*places)
     lines = replace(
-        before, source=source, begin_line=line.astype(np.int32, copy=False),
-        numbers=found.numbers, value=found.value,
-    )  # fmt: skip
-    return RereadLines(lines, found.changed, found.added)
+        before, source=source, begin_line=line, numbers=numbers, value=value
+    )
+    return RereadLines(lines, changed, added)

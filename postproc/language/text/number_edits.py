@@ -26,8 +26,6 @@ from postproc.language.text.statement_table import Statements
 from postproc.language.text.templates import Shapes
 from postproc.language.visits import Literals
 
-# What new numbers must leave alone: the shapes of lines and where numbers stand.
-
 AT_ONCE = 200_000  # numbers compared: what that takes is small beside two texts
 NO_STAMP = Span(0, 0)
 
@@ -145,8 +143,6 @@ def _part_of_a_number(before: Skeleton, place: int) -> str:
     line = before.source.line_of(place)
     return f"line {line}: an edit does not replace one whole number"
 
-
-# The edits, file by file.
 
 Texts = NDArray[np.bytes_]
 MOST_DIGITS = 1_000  # of a number that is written again

@@ -16,8 +16,6 @@ from postproc import _native
 from postproc.arrays import Bytes, Indices, Ints, chunks
 from postproc.exceptions import PostprocError, ProgramError
 
-# What is to be changed in a text: single edits, or a million of them as arrays.
-
 AT_ONCE = 50_000  # edits that are Python objects at the same time
 LAST = 2**31 - 1  # offset in a file; none that is read is as long
 
@@ -178,9 +176,6 @@ def as_texts(rows: Bytes) -> NDArray[np.bytes_]:
     return texts
 
 
-# Where the numbers of a text stand, by the million.
-
-
 @dataclass(frozen=True)
 class NumberSpans:
     """Where m numbers stand in a text, in ascending order, in 3 bytes each as a rule.
@@ -220,8 +215,6 @@ class NumberSpans:
         """Return where some of them end."""
         return self.starts(rows) + self.length[rows].astype(np.int32)
 
-
-# Source text as bytes, places in it, and edits that leave every other byte alone.
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 UTF8_MARK = b"\xef\xbb\xbf"

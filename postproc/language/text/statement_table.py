@@ -12,14 +12,8 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Indices, release_memory
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
+from postproc.language.text import templates
 from postproc.language.text.source import NumberSpans, Source, Span
-from postproc.language.text.templates import (
-    ParsedShapes,
-    Shapes,
-    find_shapes,
-    number_in_order,
-    parse_shapes,
-)
 from postproc.language.visits import Diagnostic
 
 _WORD = re.compile(r"[A-Za-z_$]\w*")
@@ -42,7 +36,7 @@ class Statements(Generic[T]):
     """
 
     source: Source
-    said: ParsedShapes[T]
+    said: templates.ParsedShapes[T]
     shape: Indices
     begin_line: Indices
     first: Indices
@@ -54,7 +48,7 @@ class Statements(Generic[T]):
         return len(self.shape)
 
     @property
-    def shapes(self) -> Shapes:
+    def shapes(self) -> templates.Shapes:
         """Return the distinct masks of statements, in the order of appearance."""
         return self.said.shapes
 
@@ -78,7 +72,7 @@ class Statements(Generic[T]):
             behind: The row behind the last one.
         """
         shape = self.shape[first:behind]
-        number, example = number_in_order(shape)
+        number, example = templates.number_in_order(shape)
         passed = [test(self.said[k]) for k in shape[example].tolist()]
         rows = first + np.flatnonzero(np.array(passed, dtype=bool)[number])
         return rows.astype(np.int32)
@@ -150,9 +144,7 @@ class StatementText(Statements[T]):
 
 
 def read_text(
-    source: Source,
-    scan: Callable[[bytes], tuple[Any, ...]],
-    parse: Callable[[str], T],
+    source: Source, scan: Callable[[bytes], tuple[Any, ...]], parse: Callable[[str], T]
 ) -> StatementText[T]:
     """Read the statements of a file.
 
@@ -176,8 +168,8 @@ def read_text(
             line=source.line_of(at),
         )
     at_names = np.asarray(name_first[:-1])
-    shapes, shape = find_shapes(forms, form, at_names, names[1], names[0])
-    said = parse_shapes(shapes, parse)
+    shapes, shape = templates.find_shapes(forms, form, at_names, names[1], names[0])
+    said = templates.parse_shapes(shapes, parse)
     places, value = numbers
     value[~np.isfinite(value)] = np.nan
     line = source.lines_of(begin).astype(np.int32)

@@ -16,8 +16,6 @@ from postproc.arrays import Bools, Indices, Interned, Ints
 from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.symbol_column import NameColumn
 
-# Rows that are alike, numbered in the order in which they appear.
-
 
 def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
     """Number sequences of whole numbers so that equal ones have the same number, (k,).
@@ -107,11 +105,7 @@ class Shapes:
 
 
 def find_shapes(
-    texts: Sequence[bytes],
-    text: AnyInts,
-    at: AnyInts,
-    name: Ints,
-    names: NameColumn,
+    texts: Sequence[bytes], text: AnyInts, at: AnyInts, name: Ints, names: NameColumn
 ) -> tuple[Shapes, Ints]:
     """Find the distinct shapes of lines, in the order of appearance.
 

@@ -19,7 +19,7 @@ HERE = Scope(0, "m", "main")
 
 
 def point(name, index=(), row=0):
-    return AssignedPoint((0, "m", "", name), None, row, HERE, index)
+    return AssignedPoint((0, "m", "", name), None, HERE.at(row), index)
 
 
 def test_an_element_is_forgotten_alone_or_with_its_array():

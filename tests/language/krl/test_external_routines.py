@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from postproc.language.krl.external_routines import package_routines
+from postproc.language.krl.symbols import package_routines
 
 
 def test_the_page_shows_the_list():

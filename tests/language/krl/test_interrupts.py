@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.diagnostics import Code
-from postproc.language.krl.external_routines import package_routines
+from postproc.language.krl.symbols import package_routines
 from postproc.language.language import Start
 from postproc.language.visits import ELSEWHERE, START
 from tests.language.krl.test_visits import codes, job, names, origins, reasons
