@@ -231,6 +231,24 @@ def test_an_element_that_only_the_run_tells_holds_all_of_them(
     assert codes(found)[0] and found.literals.pinned[found.target.literal[1]]
 
 
+@pytest.mark.parametrize("index", [1, 2])
+def test_an_element_of_which_one_that_only_the_run_tells_is_a_copy(
+    index: int, bench_cell: Cell
+) -> None:
+    """A move to any element of `s` may go to the numbers of `row{1}`."""
+    point = RAPID.partition("p1:=")[2].partition(";")[0]
+    row = f"CONST robtarget row{{2}}:=[{point},{point}];\nVAR num n;"
+    body = "\n".join(
+        [
+            f"s{{1}}:=row{{{index}}};",
+            *(_say("rapid", f"go {to}") for to in ("s[m]", "row[1]")),
+        ]
+    )
+    text = RAPID.replace("VAR num n;", row, 1) % (body, ROUTINES["rapid"])
+    found = read_program({"job.mod": text.encode()}, bench_cell).visits
+    assert codes(found)[0] and found.literals.pinned[found.target.literal[1]]
+
+
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_points_that_are_copied_on_two_ways(language: str, bench_cell: Cell) -> None:
     same = branch("set v := p1", other=("set v := p2", "set v := p1"))

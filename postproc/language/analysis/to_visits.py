@@ -312,7 +312,7 @@ class TaskCollector(ABC):
         uncertain = _find_uncertain({*elements}, self.machine.task.uses.copies)
         copied = uncertain - elements.keys()
         for v in found:
-            unknown = {v.goal.name} & copied
+            unknown = {v.goal.name, array_of(v.goal.name)} & copied
             for point in v.goal.given:
                 unknown |= point.names & uncertain
             if unknown:
