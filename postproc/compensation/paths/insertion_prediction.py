@@ -30,7 +30,12 @@ from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
 from postproc.compensation.paths.meant_sides import PlanSides
 from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy, gather_paths
-from postproc.compensation.paths.plan_outcomes import Predicted
+from postproc.compensation.paths.plan_outcomes import (
+    MoveOutcomes,
+    Predicted,
+    Rows,
+    compare,
+)
 from postproc.compensation.paths.split_constraints import (
     hindrances,
     speeds_of_pieces,
@@ -58,6 +63,9 @@ AIM = 0.4  # of the tolerance: what points are to reach
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
 Write = Callable[[ParsedProgram, WindowResult, Job], tuple[Output, ParsedProgram]]
+
+Compared = tuple[Rows, tuple[Part, ...]]
+"""A move, and what tells of it with each of the plans that are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +102,7 @@ class InsertionTask:
     splitter: Splitter
     _whole: dict[Written, PathPrediction] = field(default_factory=dict, repr=False)
     _parts: dict[tuple[int, Key], Part] = field(default_factory=dict, repr=False)
+    _compared: dict[Compared, MoveOutcomes] = field(default_factory=dict, repr=False)
 
     @property
     def visits(self) -> Visits:
@@ -189,6 +198,23 @@ class InsertionTask:
         if len(self._whole) > KEPT:
             del self._whole[next(iter(self._whole))]
         return replace(found, plan=plan)
+
+    def compare(
+        self, made: Sequence[PathPrediction], moves: Sequence[Rows]
+    ) -> dict[Rows, MoveOutcomes]:
+        """Compare no points on moves with what some plans put there.
+
+        What was compared stays as long as the same predictions tell of a move.
+        """
+        plans = [self.predict(InsertionPlan()), *made]
+        keys = [
+            (rows, tuple(plan.part_of(v) for plan in plans for v in rows))
+            for rows in moves
+        ]
+        new = [key[0] for key in keys if key not in self._compared]
+        found = compare([plan.predicted for plan in plans], new, self.tolerance)
+        self._compared.update((key, found[key[0]]) for key in keys if key[0] in found)
+        return {key[0]: self._compared[key] for key in keys}
 
     @cached_property
     def _source(self) -> Part:

@@ -64,7 +64,7 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.stops & plan.points.keys(),
         left,
         sizes_of(task.first.paths),
-        {v: one.choose()[1] for v, one in outcomes.items()},
+        {v: one.choice[1] for v, one in outcomes.items()},
         find_reapproaches(now),
         plan.unconfirmed,
         _cures(now),

@@ -110,6 +110,11 @@ class PathAccuracy:
         """Return the samples of the path to a visit."""
         return self.samples(self.row_of(visit))
 
+    def spans_to(self, visits: Ints) -> tuple[Ints, Ints]:
+        """Return where the samples of the paths to visits begin, and how many, (k,)."""
+        rows = np.searchsorted(self.visit, visits)
+        return self.first[rows], self.first[rows + 1] - self.first[rows]
+
     def row_of(self, visit: int) -> int:
         """Return which path leads to a visit."""
         return int(np.searchsorted(self.visit, visit))
