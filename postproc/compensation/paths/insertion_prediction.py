@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.options import Job
 from postproc.compensation.outcome import Status
 from postproc.compensation.paths import changed_windows
@@ -324,13 +324,20 @@ class InsertionTask:
         options = self.setting.options.without_clones()
         return correct(reading, replace(self.setting, options=options))
 
-    def _joints_along(self, v: int, share: Floats) -> Floats:
-        """Return the joint angles at shares (k,) of the way to a visit, (k, 6)."""
+    def _joints_along(self, visits: Ints, share: Floats) -> Floats:
+        """Return the joint angles at shares (k,) of the ways to visits, (k, 6)."""
         paths = self.first.paths
-        rows = paths.samples_to(v)
-        way = paths.way[rows]
-        found = [np.interp(share * way[-1], way, q) for q in paths.q[rows].T]
-        return np.stack(found, axis=1)
+        start, count = paths.spans_to(visits)
+        rows, last = spans(start, count), np.cumsum(count) - 1
+        way, move = paths.way[rows], np.arange(len(visits))
+        apart = 1.0 + float(way.max(initial=0.0))
+        at = share * way[last]
+        ends = np.searchsorted(way + apart * np.repeat(move, count), at + apart * move)
+        ends = np.clip(ends, np.minimum(last - count + 2, last), last)
+        begins = np.maximum(ends - 1, last - count + 1)
+        u = (at - way[begins]) / np.maximum(way[ends] - way[begins], 1e-12)
+        q, u = paths.q[rows], np.clip(u, 0.0, 1.0)[:, None]
+        return np.asarray((1 - u) * q[begins] + u * q[ends])
 
     def list_wanted_arcs(self, plan: InsertionPlan) -> WantedArcs:
         """Return the arcs that a plan cuts."""
