@@ -102,6 +102,7 @@ class InsertionTask:
     splitter: Splitter
     _whole: dict[Written, PathPrediction] = field(default_factory=dict, repr=False)
     _parts: dict[tuple[int, Key], Part] = field(default_factory=dict, repr=False)
+    _settled: set[tuple[int, Key]] = field(default_factory=set, repr=False)
     _compared: dict[Compared, MoveOutcomes] = field(default_factory=dict, repr=False)
 
     @property
@@ -170,22 +171,47 @@ class InsertionTask:
     def predict(self, plan: InsertionPlan) -> PathPrediction:
         """Correct the program with the points of a plan, and predict it.
 
-        Only windows whose points, or whose run-up's, have not been predicted lately;
-        of short programs, and where that is most of it, all.
+        Only windows whose points, or whose run-up's, have not been predicted lately,
+        and those behind them where links lie otherwise; of short programs, and where
+        that is most of it, all.
         """
         short = len(self.visits) < changed_windows.LEAST
         if plan.approaches or (plan.points and short):
             return self.predict_whole(plan)
         keys = self.windows.list_keys(plan)
-        new = [k for k, key in keys.items() if (k, key) not in self._parts]
-        if new and not self._predict_windows(plan, keys, new):
+        own = self.windows.of_visits(plan.points)
+        if not self._know(plan, keys, own.tolist()):
+            return self.predict_whole(plan)
+        behind = self._list_changed_behind(keys, own)
+        if not self._know(plan, keys, behind):
             return self.predict_whole(plan)
         part = np.zeros(len(self.visits), dtype=np.int64)
         parts = {self._source: 0}  # no two of them are equal
-        for k, key in keys.items():
-            number = parts.setdefault(self._parts[k, key], len(parts))
+        for k in (*own.tolist(), *behind):
+            number = parts.setdefault(self._parts[k, keys[k]], len(parts))
             part[self.windows.own(k)] = number
         return PathPrediction(self, plan, tuple(parts), part)
+
+    def _know(
+        self, plan: InsertionPlan, keys: Mapping[int, Key], some: Sequence[int]
+    ) -> bool:
+        """Predict those of some windows that are new; see `_predict_windows`."""
+        new = [k for k in some if (k, keys[k]) not in self._parts]
+        return not new or self._predict_windows(plan, keys, new)
+
+    def _list_changed_behind(self, keys: Mapping[int, Key], own: Ints) -> list[int]:
+        """List the windows that others with points before them may change.
+
+        Where these end with all links as in the source nothing is changed behind them.
+
+        Args:
+            keys: What the plan puts on windows and their run-ups.
+            own: The windows with points.
+        """
+        behind = np.array(sorted(keys.keys() - {*own.tolist()}), dtype=np.int64)
+        last = own[np.searchsorted(own, behind) - 1].tolist()
+        pairs = zip(behind.tolist(), last, strict=True)
+        return [k for k, at in pairs if (at, keys[at]) not in self._settled]
 
     def predict_whole(self, plan: InsertionPlan) -> PathPrediction:
         """Correct the program with the points of a plan, write it, and predict it.
@@ -302,6 +328,10 @@ class InsertionTask:
         if not self._is_where_it_was(part, inside):
             return False
         self._parts.update({(k, keys[k]): part for k in some})
+        travels = "travel" in self.setting.model.needs
+        alike = part.ends_as(self.first.after, windows.end[list(some)], travels)
+        pairs = zip(some, alike.tolist(), strict=True)
+        self._settled.update((k, keys[k]) for k, settled in pairs if settled)
         return True
 
     def _is_where_it_was(self, part: Part, inside: Bools) -> bool:
