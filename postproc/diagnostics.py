@@ -275,6 +275,14 @@ class Code(StrEnum):
         "their flanks there, by more than half of the path tolerance.",
         "Measure it: survey.reversals, or diagnose --path.",
     )
+    FAST_STOP_UNCERTAIN = (
+        "fast-stop-uncertain",
+        NOTE,
+        "JOINT moves reach targets fast: if links run on there to the other flank of "
+        "their gaps, the targets are off by more than the path tolerance.",
+        "Let these moves end at 20 % of the speed of the joints or less, or measure a "
+        "path: diagnose --path.",
+    )
     REAPPROACH_INSERTED = (
         "reapproach-inserted",
         NOTE,

@@ -151,6 +151,23 @@ def test_how_far_joint_angles_lead_from_others(chain, random, laid_out):
         _native.departure(chain.pack(), given[0], np.ones((2, 3)), offset)
 
 
+def test_what_a_share_of_ways_stays_within(random):
+    """Ways of one sample, ways of no length, and equal values."""
+    first = np.append(0, np.cumsum(random.integers(1, 40, 300)))
+    values = random.uniform(0, 1, first[-1]).round(2)
+    weight = random.uniform(0, 1, first[-1]) * (random.uniform(size=first[-1]) > 0.2)
+    weight[first[3] : first[4]] = 0.0
+    ways = random.permutation(300)[:200]
+    for share in (0.5, 0.95, 1.0):
+        given = share, values, weight, first, ways
+        assert np.array_equal(_native.stays_within(*given), paths.stays_within(*given))
+    for wrong in ([-1], [300]):
+        with pytest.raises(IndexError, match="no such way"):
+            _native.stays_within(0.5, values, weight, first, np.array(wrong))
+    with pytest.raises(ValueError, match="columns of"):
+        _native.stays_within(0.5, values, weight[1:], first, ways)
+
+
 def test_whole_turns(random, laid_out):
     q, turns = random.uniform(-20, 20, (90, 6)), random.integers(-2, 3, (90, 3)) / 2.0
     q[:4] = [[0.0], [-0.0], [np.pi], [-np.pi]]

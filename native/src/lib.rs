@@ -31,6 +31,7 @@ mod pull;
 mod rescan;
 mod rounding;
 mod rows;
+mod shares;
 mod solver;
 mod spans;
 mod spline;
@@ -89,6 +90,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(terms::turned, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(deviation::departure, module)?)?;
+    module.add_function(wrap_pyfunction!(shares::stays_within, module)?)?;
     module.add_function(wrap_pyfunction!(design::gram, module)?)?;
     module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::by_groups, module)?)?;

@@ -318,7 +318,7 @@ def _record(reading: ParsedProgram, draft: CompensatedProgram, setting: Job) -> 
     arrivals = tell_arrivals(visits, d, files)
     told = setting.options.to_dict()
     return replace(
-        output.sidecar(draft.reading, setting.model.id, told, arrivals),
+        output.sidecar(setting.model.id, told, arrivals),
         assumed=tuple(
             (x.file, x.line, x.message)
             for x in reading.diagnostics

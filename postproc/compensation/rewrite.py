@@ -46,11 +46,13 @@ class Output:
         files: All files of the program by name, the program first.
         stamps: Where those that changed are stamped; `NO_STAMP` where nothing did.
         edits: Numbers that were changed in every file, in the order of the files.
+        all_edits: The files as they were given, with all that is changed in each.
     """
 
     files: Mapping[str, bytes]
     stamps: Mapping[str, Span]
     edits: tuple[Replacements, ...]
+    all_edits: tuple[tuple[Source, Replacements], ...]
 
     @property
     def changed(self) -> dict[str, bytes]:
@@ -64,7 +66,6 @@ class Output:
 
     def sidecar(
         self,
-        reading: ParsedProgram,
         model: str,
         options: Mapping[str, object],
         arrivals: Mapping[str, Mapping[str, object]],
@@ -72,7 +73,6 @@ class Output:
         """Return the record beside the program.
 
         Args:
-            reading: The program.
             model: Id of the model.
             options: What the user asked for.
             arrivals: What came of the targets in every file.
@@ -82,7 +82,7 @@ class Output:
                 source, self.stamps[source.name], own, self.files[source.name],
                 arrivals[source.name],
             )
-            for source, own in all_edits(reading, self.edits)
+            for source, own in self.all_edits
             if source.name in self.stamps
         }  # fmt: skip
         return Sidecar(__version__, model, records, options)
@@ -104,7 +104,8 @@ def write_edits(
     nothing = not any(edits) and not any(reading.cloned)
     files, stamps = {}, {}
     comment = language_of(reading.sources[0].name).comment
-    for number, (source, own) in enumerate(all_edits(reading, edits)):
+    found = tuple(_compose_edits(reading, edits))
+    for number, (source, own) in enumerate(found):
         files[source.name] = source.data
         if number == 0 and nothing:
             stamps[source.name] = NO_STAMP
@@ -114,10 +115,10 @@ def write_edits(
             text = memoryview(apply(source.data, own))  # its header is as it was
             files[source.name] = b"".join((text[:at], stamp, text[at:]))
             stamps[source.name] = Span(at, at + len(stamp))
-    return Output(files, stamps, edits)
+    return Output(files, stamps, edits, found)
 
 
-def all_edits(
+def _compose_edits(
     reading: ParsedProgram, edits: Sequence[Replacements]
 ) -> Iterator[tuple[Source, Replacements]]:
     """Go through the files as they were given, with all that is changed in them."""

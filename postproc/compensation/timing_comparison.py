@@ -162,6 +162,10 @@ class InTime:
              f"{len(told.unconfirmed)} moves: neither reversals (survey.reversals) "
              "nor a measured path (diagnose --path) tell closely enough how the joints "
              "change their flanks there"),
+            (Code.FAST_STOP_UNCERTAIN, told.fast_stops,
+             f"fast JOINT moves reach {len(told.fast_stops)} targets: these are off by "
+             f"up to {max(told.fast_stops.values(), default=0.0) / MM:.3f} mm if links "
+             "run on there"),
             (Code.REAPPROACH_INSERTED, told.approaches,
              f"{len(told.approaches)} targets are approached "
              "again, from an inserted stop on the path already travelled"),

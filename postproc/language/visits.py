@@ -179,7 +179,7 @@ def _take(column: Any, rows: Ints | slice) -> Any:
     if isinstance(column, NameColumn):
         return column.take(rows)
     if isinstance(column, Sequence):
-        return tuple(column[k] for k in rows.tolist())
+        return tuple(map(column.__getitem__, rows.tolist()))
     return column[rows]
 
 

@@ -66,10 +66,9 @@ def on_the_way(side: Floats | float, width: Floats | float) -> Floats:
     Returns:
         -1 on one flank, 1 on the other.
     """
-    side, elastic = np.asarray(np.clip(side, -1.0, 1.0)), np.greater(width, 1.0)
-    if not elastic.any():
-        return side
-    return np.asarray(np.where(elastic, np.sin(np.pi / 2 * side), side))
+    side = np.asarray(np.clip(side, -1.0, 1.0))
+    between = np.greater(width, 1.0) & (np.abs(side) < 1.0)
+    return np.sin(np.pi / 2 * side, where=between, out=side)
 
 
 def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:

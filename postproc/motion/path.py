@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, few_rows, floats
+from postproc.arrays import Bools, Floats, Ints, chunks, few_rows, floats
 from postproc.motion.targets import Targets
 from postproc.robot.pose import (
     inverse,
@@ -182,6 +182,7 @@ def join_segments(parts: list[Segments]) -> Segments:
 # Samples of the Cartesian paths whose both ends are known before joint angles are.
 
 LEAST = 4  # intervals of a path between stops, however short
+AT_ONCE = 16_384  # samples that are placed at a time
 BLIND = 32  # intervals of a path whose length is not known beforehand
 
 
@@ -283,11 +284,14 @@ class _Ends:
         path = np.repeat(np.arange(len(edge)), inner)
         first = np.concatenate([[0], np.cumsum(np.bincount(path, minlength=len(edge)))])
         nth = np.arange(len(path)) - first[path]
-        tcp = segments.poses(path, (nth + 1) / intervals[path])
-        tool = self.targets.tool.take(self.visit[edge[path]], axis=0)
+        share, flange = (nth + 1) / intervals[path], np.empty((len(path), 4, 4))
+        for rows in chunks(len(path), AT_ONCE):
+            tool = self.targets.tool.take(self.visit[edge[path[rows]]], axis=0)
+            tcp = segments.poses(path[rows], share[rows])
+            np.matmul(tcp, inverse(tool), out=flange[rows])
         return Samples(
             self.visit, self.source, self.cartesian, ready, broken, self.begins, start,
-            length, turning, inner=start[edge[path]] + nth, flange=tcp @ inverse(tool),
+            length, turning, inner=start[edge[path]] + nth, flange=flange,
         )  # fmt: skip
 
     def _flags(

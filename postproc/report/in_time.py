@@ -33,6 +33,7 @@ def describe_timing(told: InTime, visits: Visits) -> dict[str, object]:
             "after": asdict(ErrorStatistics.of_sizes(told.paths.after.sizes)),
             "unknown": paths.unknown,
             **_round_off(corners),
+            **_fast_stops(told.inserted, visits),
         },
         "path": [
             _path(paths, k, visits)
@@ -110,6 +111,17 @@ def _round_off(corners: RoundOff) -> dict[str, object]:
     pair = {"before": corners.before, "after": corners.after}
     sizes = {key: asdict(ErrorStatistics.of_sizes(x)) for key, x in pair.items()}
     return {"cornering_round_off": sizes}
+
+
+def _fast_stops(inserted: Insertions | None, visits: Visits) -> dict[str, object]:
+    """Describe the targets that fast JOINT moves may miss, where there are any."""
+    if inserted is None or not inserted.fast_stops:
+        return {}
+    stops = [
+        {"line": int(visits.place.line[v]), "visit": v, "off_mm": round(off / MM, 5)}
+        for v, off in inserted.fast_stops.items()
+    ]
+    return {"fast_stops": stops}
 
 
 def _corner(k: int, corners: RoundOff | None) -> dict[str, object]:

@@ -78,7 +78,7 @@ def rewrite(files: Mapping[str, bytes], cell: Cell) -> str:
     output = write_numbers(reading, rows, new, "0" * 12)
     values = read_back(visits, rows, output.edits)
     check_output(reading, read_program(output.files, cell), output, rows, values)
-    record = output.sidecar(reading, "0" * 12, {}, {name: {} for name in output.stamps})
+    record = output.sidecar("0" * 12, {}, {name: {} for name in output.stamps})
     check_bytes(files, output.files, record.files, visits)
     return "rewritten"
 

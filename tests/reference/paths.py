@@ -22,6 +22,18 @@ def lines(tool, flange, begin, end):
     return [np.array(column) for column in zip(*out, strict=True)]
 
 
+def stays_within(share, values, weight, first, ways):
+    """Return what a share of the weight of some ways stays within."""
+    out = []
+    for w in ways:
+        own = slice(first[w], first[w + 1])
+        order = np.argsort(values[own], kind="stable")
+        done = np.cumsum(weight[own][order])
+        reached = np.argmax(done >= share * done[-1])
+        out.append(values[own][order[reached]])
+    return np.array(out)
+
+
 def to_move(pull, wanted, rounds):
     """Move targets so that the path moves as wanted: Jacobi's method."""
     moved = np.array(wanted)

@@ -85,8 +85,8 @@ class CutArc:
         chords: Which pieces are chords whatever they bend.
         turns: What the tool turns by at the cuts in its own frame, (k, 3) [rad]; at
             the end of the arc it stays what the source wrote.
-        joints: Joint angles (k, 6) [rad] at shares (k,) of the way to a visit; None:
-            points have the flags of the arc's start.
+        joints: Joint angles (k, 6) [rad] at shares (k,) of the ways to visits (k,);
+            None: points have the flags of the arc's start.
     """
 
     numbers: Floats
@@ -96,7 +96,7 @@ class CutArc:
     via: int
     chords: Chords
     turns: tuple[Floats, Floats]
-    joints: Callable[[int, Floats], Floats] | None = None
+    joints: Callable[[Ints, Floats], Floats] | None = None
 
     @classmethod
     def of(
@@ -106,7 +106,7 @@ class CutArc:
         via: int,
         chords: Chords,
         turns: Mapping[int, Floats] = MappingProxyType({}),
-        joints: Callable[[int, Floats], Floats] | None = None,
+        joints: Callable[[Ints, Floats], Floats] | None = None,
     ) -> CutArc:
         """Look at the arc with the point `via` on its way."""
         rows = [int(visits.graph.before[via]), via, via + 1]
@@ -150,7 +150,7 @@ class CutArc:
         turned = pose[:3, :3] @ own @ self.halves[0].rotation[0].T
         out = self.visits.dialect.rotate(out, turned[None])
         if self.joints is not None:
-            q = self.joints(self.via + half, np.array([share]))
+            q = self.joints(np.array([self.via + half]), np.array([share]))
             out = self.visits.dialect.count_flags(out, q)
         return np.asarray(out[0])
 

@@ -9,11 +9,10 @@ all joints, and leaves some of them within their play.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Ints, spans
 from postproc.compensation.options import Job
 from postproc.compensation.paths.path_error import sides_on_move
 from postproc.language.visits import OrientationLaw, Visits
@@ -24,6 +23,7 @@ from postproc.robot.pose import rotation_vector
 
 WHOLE = 0.999  # of half the play: a drive that lies there has crossed
 LEAVING = 5e-3  # [m] behind which a move is under way
+LEAST = 1e-9  # of half the play: less is no way of a drive
 CROSSES = 0.3  # of half the play: a joint that goes so far will rest on that flank
 
 
@@ -42,32 +42,35 @@ class BacklashPreload:
     crossing: tuple[int, ...]
 
 
-def cross_at_once(side: Floats) -> Floats:
-    """Let drives that cross their gaps on a way do so where they begin to, (k, 6).
+def cross_at_once(side: Floats, first: Ints) -> Floats:
+    """Let drives that cross their gaps on ways do so where they begin to, (s, 6).
 
     Those too that turn back before they are across, and were under way: a link that is
     to turn, and turn again, has to be pushed by one flank, and by the other. One that
     rests on its way across, and goes on, is under way.
 
     Args:
-        side: Where each joint lies in its play along the way, (k, 6) from -1 to 1.
+        side: Where each joint lies in its play along some ways, (s, 6) from -1 to 1.
+        first: The samples of way w are first[w] .. first[w + 1] - 1.
     """
     out = np.array(side)
-    step = np.sign(np.diff(side, axis=0)) * (np.abs(np.diff(side, axis=0)) > 1e-9)
-    for joint in np.flatnonzero(step.any(axis=0)).tolist():
-        sense = step[:, joint]
-        for a, b in pairwise(np.flatnonzero(sense).tolist()):
-            if sense[a] == sense[b]:
-                sense[a:b] = sense[a]
-        begins = np.flatnonzero(np.diff(sense, prepend=0.0) != 0)
-        ends = np.append(begins, len(sense))[1:]
-        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-            moves = sense[begin]
-            whole = moves * side[end, joint] > WHOLE
-            far = moves * (side[end, joint] - side[begin, joint]) > CROSSES
-            goes_on = end == len(sense) or sense[end] == -moves
-            if moves and (whole or (far and goes_on)):
-                out[begin + 1 : end + 1, joint] = moves
+    step = np.diff(side, axis=0)
+    step[first[1:-1] - 1] = 0.0
+    for joint in range(side.shape[1]):
+        at = np.flatnonzero(np.abs(step[:, joint]) > LEAST)
+        if not len(at):
+            continue
+        sense, way = np.sign(step[at, joint]), np.searchsorted(first, at, side="right")
+        turns = np.flatnonzero((np.diff(sense) != 0) | (np.diff(way) != 0))
+        opens, closes = np.append(0, turns + 1), np.append(turns, len(at) - 1)
+        begin, end, moves = at[opens], at[closes] + 1, sense[opens]
+        whole = moves * side[end, joint] > WHOLE
+        far = moves * (side[end, joint] - side[begin, joint]) > CROSSES
+        turns_back = np.append(end[:-1] == begin[1:], False)
+        goes_on = (end == first[way[opens]] - 1) | turns_back
+        crosses = whole | (far & goes_on)
+        count = (end - begin)[crosses]
+        out[spans(begin[crosses] + 1, count), joint] = np.repeat(moves[crosses], count)
     return out
 
 
@@ -85,7 +88,7 @@ def take_up(
     cell = setting.cell
     way, sides = sides_on_move(cycle, cell, setting.model, v)
     at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
-    came, leaves = sides[0], cross_at_once(sides)[at]
+    came, leaves = sides[0], cross_at_once(sides, np.array([0, len(way)]))[at]
     crosses = (np.abs(leaves - came) > CROSSES) & (np.abs(leaves) > WHOLE)
     crosses &= nominal_widths(flanks_of(setting.model, cell.arm)) == 1.0
     crossing = tuple((np.flatnonzero(crosses) + 1).tolist())

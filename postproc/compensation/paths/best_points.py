@@ -83,11 +83,14 @@ def _unfit(now: PathPrediction) -> set[int]:
 def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
     """Say what the moves have now, by their first visits, and how they do."""
     plan, sizes, found = now.plan, now.sizes, dict[int, _Tried]()
+    chords = dict[int, list[Cut]]()
+    for cut in plan.chords:
+        chords.setdefault(cut[0], []).append(cut)
     for own in {halves(now.task.visits, v) for v in plan.open}:
         found[own[0]] = _Tried(
             hypot(*(sizes.get(row, np.inf) for row in own)),
             {row: plan.points[row] for row in own if row in plan.points},
             plan.stops.intersection(own),
-            frozenset(cut for cut in plan.chords if cut[0] in own),
+            frozenset(cut for row in own for cut in chords.get(row, ())),
         )
     return found

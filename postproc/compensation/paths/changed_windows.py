@@ -28,6 +28,7 @@ from postproc.language.visits import Graph, Meaning, Visits
 from postproc.model.backlash_width import half_widths
 from postproc.model.flank_hypotheses import FlankOfJoint
 from postproc.motion.cycle_time import ProgramCycle
+from postproc.robot.direction import half_width
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -36,6 +37,7 @@ MOST = 0.6  # of the visits: more are predicted as a whole
 BACK = 60  # visits of a run-up; where they do not tell, the program's start does
 MARGIN = 5e-3  # [rad] that a joint turns beyond its gap: what corrections move it by
 SAME = 1e-4  # [rad] by which joints at a target may differ
+ALIKE = 1e-3  # of half the play: by which links may lie otherwise where windows end
 
 Key = tuple[Any, ...]
 """What a plan puts on the ways of a window and of its run-up."""
@@ -80,9 +82,33 @@ class Part:
         moved = self.decisions.corrected - self.visits.target.values
         return np.asarray(moved[:, :3] * MM)
 
+    def ends_as(self, source: ProgramCycle, visits: Ints, travels: bool) -> Bools:
+        """Return where joints lie in their play as they do in the source, (k,).
+
+        Args:
+            source: The source, compensated, in time.
+            visits: Visits of the source, (k,).
+            travels: How far joints have travelled matters too.
+        """
+        here = _lie_in_play(self.in_time.after, self.own[visits], travels)
+        there = _lie_in_play(source, visits, travels)
+        alike = np.isclose(here, there, rtol=0.0, atol=ALIKE, equal_nan=True)
+        return np.asarray(alike.all(axis=1))
+
     def rows_on_way(self, v: int) -> Ints:
         """Return its visits on the way to a visit of the source, without that."""
         return np.arange(int(self.own[v - 1]) + 1 if v else 0, int(self.own[v]))
+
+
+def _lie_in_play(cycle: ProgramCycle, rows: Ints, travels: bool) -> Floats:
+    """Return what is known of links at some visits, of half their play, (k, w)."""
+    arm, arrived = cycle.arm, cycle.arrived
+    angles, half = cycle.path.q[rows] @ arm.coupling.T, half_width(arm)
+    ends = (arrived.past.play.lo, arrived.past.play.hi)
+    columns = [arrived.side[rows], *((z[rows] - angles) / half for z in ends)]
+    if travels:
+        columns.append(arrived.travel[rows] / half)
+    return np.concatenate(columns, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +178,11 @@ class Windows:
         ]  # fmt: skip
         rows = np.flatnonzero(high > low).tolist()
         return {k: tuple(puts[low[k] : high[k]]) for k in rows}
+
+    def of_visits(self, visits: Collection[int]) -> Ints:
+        """Return the windows in which visits lie, ascending, (k,)."""
+        rows = np.fromiter(visits, dtype=np.int64)
+        return np.unique(np.searchsorted(self.end, rows))
 
     def own(self, k: int) -> slice:
         """Return the visits of a window."""

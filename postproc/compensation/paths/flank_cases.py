@@ -85,8 +85,9 @@ class FlankCases:
         """Return the cases that make any difference."""
         found = list[FlankCase]()
         together = {kind: np.zeros_like(self.off) for kind in _TOGETHER}
-        for joint, flank in enumerate(self._flanks):
-            sides = [*self._sides(joint, flank)]
+        open_ = self.open_sides()
+        for joint in range(len(self._flanks)):
+            sides = [*open_.of(joint)]
             rows = [np.flatnonzero(np.abs(own - self.run.side[:, joint]) > CHANGED)
                     for _, _, own in sides]  # fmt: skip
             every = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
@@ -100,6 +101,10 @@ class FlankCases:
                     together[kind][at] += by
         all_of = (self._all_of(kind, by) for kind, by in together.items())
         return (*found, *chain.from_iterable(all_of))
+
+    def open_sides(self) -> OpenSides:
+        """Return the sides of joints by open hypotheses; they take some memory."""
+        return OpenSides(self.run, self.error, self._flanks, self.way, self.first)
 
     def _case(
         self, joint: int, kind: FlankKind, weight: float, at: Ints, by: Floats
@@ -151,11 +156,25 @@ class FlankCases:
         low, high = (self.error(self.run, rows, side) for side in ends)
         return np.asarray((high - low) / 2)
 
-    def _sides(
-        self, joint: int, flank: FlankOfJoint
-    ) -> Iterator[tuple[FlankKind, float, Floats]]:
-        """Yield the sides (s,) of a joint by its open hypotheses, and their weights."""
-        usual = self.run.side[:, joint]
+
+@dataclass(frozen=True, eq=False)
+class OpenSides:
+    """Where joints lie in their plays along ways by the hypotheses that are open.
+
+    Attributes:
+        run, error, way, first: As in `FlankCases`.
+        flanks: What is known of joints 1 to 6.
+    """
+
+    run: AlongWays
+    error: ErrorAlong
+    flanks: tuple[FlankOfJoint, ...]
+    way: Floats
+    first: Ints
+
+    def of(self, joint: int) -> Iterator[tuple[FlankKind, float, Floats]]:
+        """Yield the sides (s,) of a joint (from 0), hypotheses, and their weights."""
+        flank, usual = self.flanks[joint], self.run.side[:, joint]
         for kind in flank.open_kinds:
             weight = flank.weight[kind]
             if kind in _WIDE:
@@ -183,7 +202,7 @@ class FlankCases:
     def _widths(self) -> list[list[float]]:
         """List the gaps that the hypotheses of each joint let it go over."""
         found = []
-        for flank in self._flanks:
+        for flank in self.flanks:
             kinds = [kind for kind in _WIDE if flank.is_open(kind)]
             found.append([width for kind in kinds for width in _widths_of(flank, kind)])
         return found
@@ -198,7 +217,7 @@ class FlankCases:
     @cached_property
     def _ran_on(self) -> Floats:
         """The sides of all joints whose links ran on at fast stops, (s, 6)."""
-        return self.run.run_on(self.error.cell, nominal_widths(self._flanks))
+        return self.run.run_on(self.error.cell, nominal_widths(self.flanks))
 
     @cached_property
     def _move(self) -> Ints:

@@ -200,7 +200,8 @@ def _put_on_path(
             return replace(plan, stops=plan.stops | {v}).put(v, (stop, *rest))
     wanted = _on_path(now, v)
     new = wanted[: max(room, 0)]
-    plan = replace(plan, crowded=plan.crowded or len(new) < len(wanted))
+    if len(new) < len(wanted):
+        plan = replace(plan, crowded=True)
     return plan.put(v, (*known, *new)) if new else plan
 
 
@@ -240,12 +241,12 @@ def _on_path(now: PathPrediction, v: int) -> list[float]:
     for i, (a, b) in enumerate(pairwise(ends)):
         low = a + (clear if i == 0 else least)
         high = b - (behind if i == len(known) else least)
-        inside = np.flatnonzero((way >= a) & (way <= b))
-        if high < low or not len(inside):
+        if high < low or any(a < share * way[-1] < b for share in shut):
             continue
-        if any(a < share * way[-1] < b for share in shut):
+        inside = slice(way.searchsorted(a), way.searchsorted(b, side="right"))
+        if inside.start == inside.stop:
             continue
-        top = inside[far[inside].argmax()]
+        top = inside.start + far[inside].argmax()
         if far[top] > now.task.aim:
             at = min(max(float(way[top]), low), high)
             found.append((float(far[top]), at / float(way[-1])))

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.options import Job
 from postproc.compensation.outcome import Status
 from postproc.compensation.paths import changed_windows
@@ -30,7 +30,12 @@ from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
 from postproc.compensation.paths.meant_sides import PlanSides
 from postproc.compensation.paths.moved_corners import SourceCorners
 from postproc.compensation.paths.path_error import PathAccuracy, gather_paths
-from postproc.compensation.paths.plan_outcomes import Predicted
+from postproc.compensation.paths.plan_outcomes import (
+    MoveOutcomes,
+    Predicted,
+    Rows,
+    compare,
+)
 from postproc.compensation.paths.split_constraints import (
     hindrances,
     speeds_of_pieces,
@@ -58,6 +63,9 @@ AIM = 0.4  # of the tolerance: what points are to reach
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
 Write = Callable[[ParsedProgram, WindowResult, Job], tuple[Output, ParsedProgram]]
+
+Compared = tuple[Rows, tuple[Part, ...]]
+"""A move, and what tells of it with each of the plans that are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +102,8 @@ class InsertionTask:
     splitter: Splitter
     _whole: dict[Written, PathPrediction] = field(default_factory=dict, repr=False)
     _parts: dict[tuple[int, Key], Part] = field(default_factory=dict, repr=False)
+    _settled: set[tuple[int, Key]] = field(default_factory=set, repr=False)
+    _compared: dict[Compared, MoveOutcomes] = field(default_factory=dict, repr=False)
 
     @property
     def visits(self) -> Visits:
@@ -161,22 +171,47 @@ class InsertionTask:
     def predict(self, plan: InsertionPlan) -> PathPrediction:
         """Correct the program with the points of a plan, and predict it.
 
-        Only windows whose points, or whose run-up's, have not been predicted lately;
-        of short programs, and where that is most of it, all.
+        Only windows whose points, or whose run-up's, have not been predicted lately,
+        and those behind them where links lie otherwise; of short programs, and where
+        that is most of it, all.
         """
         short = len(self.visits) < changed_windows.LEAST
         if plan.approaches or (plan.points and short):
             return self.predict_whole(plan)
         keys = self.windows.list_keys(plan)
-        new = [k for k, key in keys.items() if (k, key) not in self._parts]
-        if new and not self._predict_windows(plan, keys, new):
+        own = self.windows.of_visits(plan.points)
+        if not self._know(plan, keys, own.tolist()):
+            return self.predict_whole(plan)
+        behind = self._list_changed_behind(keys, own)
+        if not self._know(plan, keys, behind):
             return self.predict_whole(plan)
         part = np.zeros(len(self.visits), dtype=np.int64)
         parts = {self._source: 0}  # no two of them are equal
-        for k, key in keys.items():
-            number = parts.setdefault(self._parts[k, key], len(parts))
+        for k in (*own.tolist(), *behind):
+            number = parts.setdefault(self._parts[k, keys[k]], len(parts))
             part[self.windows.own(k)] = number
         return PathPrediction(self, plan, tuple(parts), part)
+
+    def _know(
+        self, plan: InsertionPlan, keys: Mapping[int, Key], some: Sequence[int]
+    ) -> bool:
+        """Predict those of some windows that are new; see `_predict_windows`."""
+        new = [k for k in some if (k, keys[k]) not in self._parts]
+        return not new or self._predict_windows(plan, keys, new)
+
+    def _list_changed_behind(self, keys: Mapping[int, Key], own: Ints) -> list[int]:
+        """List the windows that others with points before them may change.
+
+        Where these end with all links as in the source nothing is changed behind them.
+
+        Args:
+            keys: What the plan puts on windows and their run-ups.
+            own: The windows with points.
+        """
+        behind = np.array(sorted(keys.keys() - {*own.tolist()}), dtype=np.int64)
+        last = own[np.searchsorted(own, behind) - 1].tolist()
+        pairs = zip(behind.tolist(), last, strict=True)
+        return [k for k, at in pairs if (at, keys[at]) not in self._settled]
 
     def predict_whole(self, plan: InsertionPlan) -> PathPrediction:
         """Correct the program with the points of a plan, write it, and predict it.
@@ -189,6 +224,23 @@ class InsertionTask:
         if len(self._whole) > KEPT:
             del self._whole[next(iter(self._whole))]
         return replace(found, plan=plan)
+
+    def compare(
+        self, made: Sequence[PathPrediction], moves: Sequence[Rows]
+    ) -> dict[Rows, MoveOutcomes]:
+        """Compare no points on moves with what some plans put there.
+
+        What was compared stays as long as the same predictions tell of a move.
+        """
+        plans = [self.predict(InsertionPlan()), *made]
+        keys = [
+            (rows, tuple(plan.part_of(v) for plan in plans for v in rows))
+            for rows in moves
+        ]
+        new = [key[0] for key in keys if key not in self._compared]
+        found = compare([plan.predicted for plan in plans], new, self.tolerance)
+        self._compared.update((key, found[key[0]]) for key in keys if key[0] in found)
+        return {key[0]: self._compared[key] for key in keys}
 
     @cached_property
     def _source(self) -> Part:
@@ -276,6 +328,10 @@ class InsertionTask:
         if not self._is_where_it_was(part, inside):
             return False
         self._parts.update({(k, keys[k]): part for k in some})
+        travels = "travel" in self.setting.model.needs
+        alike = part.ends_as(self.first.after, windows.end[list(some)], travels)
+        pairs = zip(some, alike.tolist(), strict=True)
+        self._settled.update((k, keys[k]) for k, settled in pairs if settled)
         return True
 
     def _is_where_it_was(self, part: Part, inside: Bools) -> bool:
@@ -298,13 +354,20 @@ class InsertionTask:
         options = self.setting.options.without_clones()
         return correct(reading, replace(self.setting, options=options))
 
-    def _joints_along(self, v: int, share: Floats) -> Floats:
-        """Return the joint angles at shares (k,) of the way to a visit, (k, 6)."""
+    def _joints_along(self, visits: Ints, share: Floats) -> Floats:
+        """Return the joint angles at shares (k,) of the ways to visits, (k, 6)."""
         paths = self.first.paths
-        rows = paths.samples_to(v)
-        way = paths.way[rows]
-        found = [np.interp(share * way[-1], way, q) for q in paths.q[rows].T]
-        return np.stack(found, axis=1)
+        start, count = paths.spans_to(visits)
+        rows, last = spans(start, count), np.cumsum(count) - 1
+        way, move = paths.way[rows], np.arange(len(visits))
+        apart = 1.0 + float(way.max(initial=0.0))
+        at = share * way[last]
+        ends = np.searchsorted(way + apart * np.repeat(move, count), at + apart * move)
+        ends = np.clip(ends, np.minimum(last - count + 2, last), last)
+        begins = np.maximum(ends - 1, last - count + 1)
+        u = (at - way[begins]) / np.maximum(way[ends] - way[begins], 1e-12)
+        q, u = paths.q[rows], np.clip(u, 0.0, 1.0)[:, None]
+        return np.asarray((1 - u) * q[begins] + u * q[ends])
 
     def list_wanted_arcs(self, plan: InsertionPlan) -> WantedArcs:
         """Return the arcs that a plan cuts."""

@@ -31,6 +31,8 @@ class Insertions:
         approaches: Share of the way at which targets are approached anew, by visit: to
             a stop, and on to the target.
         worst: How far each leaves its path at the most by any of them [m].
+        fast_stops: Targets that are farther off than asked if links run on at the fast
+            JOINT moves that reach them, and how far, by visit [m].
         unconfirmed: Moves before which play is not taken up, as no measured path
             confirms how their flanks change.
     """
@@ -48,6 +50,7 @@ class Insertions:
     cell_mm_s: float = 0.0
     limit_mm_s: float = 0.0
     worst: Mapping[int, float] = field(default_factory=dict)
+    fast_stops: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

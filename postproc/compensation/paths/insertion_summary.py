@@ -6,9 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.compensation.outcome import Status
 from postproc.compensation.paths.arcs import halves
+from postproc.compensation.paths.fast_stops import predict_fast_stops
 from postproc.compensation.paths.gathered import take_visits
-from postproc.compensation.paths.insertion_prediction import PathPrediction
+from postproc.compensation.paths.insertion_prediction import (
+    InsertionTask,
+    PathPrediction,
+)
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import BEGINS, MoveOutcomes, compare
@@ -64,14 +69,25 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.stops & plan.points.keys(),
         left,
         sizes_of(task.first.paths),
-        {v: one.choose()[1] for v, one in outcomes.items()},
+        {v: one.choice[1] for v, one in outcomes.items()},
         find_reapproaches(now),
         plan.unconfirmed,
         _cures(now),
         _cell_speed(now),
         _limit_speed(now),
         {v: one.worst for v, one in outcomes.items()},
+        _fast_stops(now.task),
     )
+
+
+def _fast_stops(task: InsertionTask) -> dict[int, float]:
+    """Return the corrected targets that fast JOINT moves may miss, see `Insertions`."""
+    setting, corrected = task.setting, task.kept.decisions.status == Status.CORRECTED
+    off = predict_fast_stops(
+        task.first.after, setting.cell, setting.model, setting.temperature
+    )
+    rows = np.flatnonzero(corrected & (off > task.tolerance))
+    return dict(zip(rows.tolist(), off[rows].tolist(), strict=True))
 
 
 def _cell_speed(now: PathPrediction) -> float:

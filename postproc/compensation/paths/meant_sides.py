@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, spans
 from postproc.compensation.options import Job
 from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.backlash_preload import (
@@ -63,7 +63,9 @@ class PlanSides:
         An arc is one way, from where it begins to where it ends.
         """
         keys, new = dict[int, MeantKey](), list[_PointsOnWay]()
-        for move in {halves(self.visits, v) for v in plan.points}:
+        moves = {halves(self.visits, v) for v in plan.points}
+        self._cross_on(sorted(moves - self._sides.keys()))
+        for move in moves:
             half = bool(plan.halved.intersection(move))
             own = {v: (v, plan.points[v], half) for v in move if v in plan.points}
             if not self._known.keys() >= {*own.values()}:
@@ -72,18 +74,25 @@ class PlanSides:
         self._known.update(self._mean(new))
         return {v: self._known[key] for v, key in keys.items()}
 
+    def _cross_on(self, moves: Sequence[tuple[int, ...]]) -> None:
+        """Let sharp joints cross their gaps on moves where they begin to."""
+        if not moves:
+            return
+        paths = self.first.paths
+        start, _ = paths.spans_to(np.array([move[0] for move in moves]))
+        last, count = paths.spans_to(np.array([move[-1] for move in moves]))
+        count += last - start
+        side, first = paths.side[spans(start, count)], np.append(0, np.cumsum(count))
+        sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
+        side[:, sharp] = cross_at_once(side[:, sharp], first)
+        self._sides.update(zip(moves, np.split(side, first[1:-1]), strict=True))
+
     def _points_on(
         self, move: tuple[int, ...], keys: Collection[MeantKey], half: bool
     ) -> Iterator[_PointsOnWay]:
         """Yield the places of points on a move, and where joints are to lie there."""
         paths = self.first.paths
-        own = [paths.samples_to(v) for v in move]
-        if move not in self._sides:
-            sharp = np.array([flank.nominal == 1.0 for flank in self.flanks])
-            side = np.array(paths.side[own[0].start : own[-1].stop])
-            side[:, sharp] = cross_at_once(side[:, sharp])
-            self._sides[move] = side
-        side = self._sides[move]
+        own, side = [paths.samples_to(v) for v in move], self._sides[move]
         if half:
             side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
         samples = dict(zip(move, own, strict=True))

@@ -79,7 +79,6 @@ class PathAccuracy:
         tangent: Directions of the programmed path there, (s, 3).
         before, after: Deviations of the program as it was written and compensated.
         unknown: Cartesian moves that nothing is predicted for.
-        crossing: Where joints of the compensated program change their flanks, (s, 6).
         q, side: Joint angles [rad] of the program as it was written, and where each
             joint lies in its play, (s, 6) each.
         cases: Where the compensated program's paths are if joints change their flanks
@@ -93,7 +92,6 @@ class PathAccuracy:
     before: Deviations
     after: Deviations
     unknown: int
-    crossing: Bools
     q: Floats
     side: Floats
     cases: FlankCases | None = None
@@ -109,6 +107,11 @@ class PathAccuracy:
     def samples_to(self, visit: int) -> slice:
         """Return the samples of the path to a visit."""
         return self.samples(self.row_of(visit))
+
+    def spans_to(self, visits: Ints) -> tuple[Ints, Ints]:
+        """Return where the samples of the paths to visits begin, and how many, (k,)."""
+        rows = np.searchsorted(self.visit, visits)
+        return self.first[rows], self.first[rows + 1] - self.first[rows]
 
     def row_of(self, visit: int) -> int:
         """Return which path leads to a visit."""
@@ -171,7 +174,7 @@ def gather_paths(parts: Sequence[PathAccuracy], rows: Sequence[Ints]) -> PathAcc
         before=gather([part.before for part in parts]),
         after=gather([part.after for part in parts]),
         unknown=parts[0].unknown + len(parts[0]) - len(visit),
-        **_gather_columns(parts, ("way", "tangent", "crossing", "q", "side"), every),
+        **_gather_columns(parts, ("way", "tangent", "q", "side"), every),
     )
 
 
@@ -241,7 +244,7 @@ def predict_paths(
         rows, pair[0].first, way, tangent,
         _deviations(runs[0], error, -off, tangent, way),
         _deviations(runs[1], error, moved, tangent, way),
-        int((cartesian & ~known).sum()), runs[1].changes(), pair[0].q, runs[0].side,
+        int((cartesian & ~known).sum()), pair[0].q, runs[0].side,
     )  # fmt: skip
     if owner is None or not len(rows):
         return found

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.paths.flank_cases import Key
 from postproc.compensation.paths.path_error import PathAccuracy, largest_in
@@ -23,8 +24,6 @@ from postproc.robot.pose import MM
 
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
-
-TOGETHER = 256  # moves that are sorted in one table
 LAST = 1.0 - 1e-9  # share of a way that is still on it
 
 
@@ -94,8 +93,9 @@ class MoveOutcomes:
         """Return how far the last plan leaves the path by any open hypothesis [m]."""
         return float(self.largest[self.weight > OPEN].max())
 
-    def choose(self) -> tuple[int, float]:
-        """Choose a plan, see `choose_plan`; return it and its promise [m]."""
+    @cached_property
+    def choice(self) -> tuple[int, float]:
+        """The plan that is chosen, see `choose_plan`, and its promise [m]."""
         return choose_plan(self.plans, self.weight, self.tolerance)
 
     def objection(self, plan: int) -> Objection | None:
@@ -142,7 +142,7 @@ def compare(
     found = [_PlannedMoves.of(plan, moves) for plan in plans]
     keys = [*dict.fromkeys(key for ways in found for key in ways.cases)]
     steps = np.max([ways.measure_steps() for ways in found], axis=0)
-    counts = ~np.array([negligible(own, tolerance) for own in steps])
+    counts = ~negligible(steps, tolerance)
     there = np.ones((len(moves), 1 + len(keys)), dtype=bool)
     for k, key in enumerate(keys, 1):
         own = np.any([ways.has(key) for ways in found], axis=0)
@@ -162,7 +162,7 @@ def compare(
         rows: MoveOutcomes(
             tuple(map(PlanOutcome, off[:, m, own], worse[:, m, own])),
             share[:, m, own],
-            tuple(keys[k - 1] for k in np.flatnonzero(own)[1:]),
+            tuple(key for key, is_own in zip(keys, own[1:], strict=True) if is_own),
             weight[m, own],
             tolerance,
             largest[m, own],
@@ -216,9 +216,10 @@ class _PlannedMoves:
     def of(cls, plan: Predicted, moves: Sequence[Rows]) -> _PlannedMoves:
         visits = np.array([v for rows in moves for v in rows])
         number = plan.part[visits]
-        own = [plan.paths[k].samples_to(v) for k, v in zip(number, visits, strict=True)]
-        start, stop = np.array([(rows.start, rows.stop) for rows in own]).T
-        count = stop - start
+        start, count = np.zeros((2, len(visits)), dtype=np.int64)
+        for k in np.unique(number).tolist():
+            mine = number == k
+            start[mine], count[mine] = plan.paths[k].spans_to(visits[mine])
         first = np.append(0, np.cumsum(count))
         way, across = np.empty((2, first[-1]))
         told = dict[Key, list[tuple[Ints, Floats, Floats]]]()
@@ -260,20 +261,8 @@ class _PlannedMoves:
 
     def measure_off(self, key: Key | None, moves: Ints) -> Floats:
         """Return what 95 % of the way of some moves stays within, (k,) [m]."""
-        far, found = self._distances(key), [np.empty(0)]
-        for k in range(0, len(moves), TOGETHER):
-            begin, end = (self._ends[moves[k : k + TOGETHER] + one] for one in (0, 1))
-            samples = begin[:, None] + np.arange(int((end - begin).max()))
-            behind = samples >= end[:, None]
-            samples[behind] = 0
-            off = np.where(behind, np.inf, far[samples])
-            order = np.argsort(off, axis=1)
-            step = np.where(behind, 0.0, self._step[samples])
-            done = np.cumsum(np.take_along_axis(step, order, axis=1), axis=1)
-            place = (done < ALONG * done[:, -1:]).sum(axis=1)
-            rows = np.arange(len(off))
-            found.append(off[rows, order[rows, place]])
-        return np.concatenate(found)
+        far = self._distances(key)
+        return _native.stays_within(ALONG, far, self._step, self._ends, moves)
 
     def measure_harm(
         self, usual: _PlannedMoves, key: Key | None, moves: Ints

@@ -88,15 +88,20 @@ def _promise(plan: PlanOutcome, open_: Bools, step: float) -> float:
 
 
 def negligible(steps: Floats, tolerance: float) -> Bools:
-    """Return which joints' steps together are too small to count against a plan, (6,).
+    """Return which joints' steps together are too small to count against a plan.
 
     The smallest first, as long as their sum stays below a fifth of the tolerance.
 
     Args:
-        steps: How far each joint moves the TCP under its worst hypothesis, (6,) [m].
+        steps: How far each joint moves the TCP under its worst hypothesis on a move,
+            (.., 6) [m].
         tolerance: Of paths [m].
+
+    Returns:
+        (.., 6).
     """
-    order = np.argsort(steps, kind="stable")
-    small = np.zeros(len(steps), dtype=bool)
-    small[order] = np.cumsum(steps[order]) < NEGLIGIBLE * tolerance
+    order = np.argsort(steps, axis=-1, kind="stable")
+    together = np.cumsum(np.take_along_axis(steps, order, axis=-1), axis=-1)
+    small = np.zeros(steps.shape, dtype=bool)
+    np.put_along_axis(small, order, together < NEGLIGIBLE * tolerance, axis=-1)
     return small

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,7 +24,6 @@ from postproc.compensation.paths.plan_outcomes import (
     MoveOutcomes,
     Objection,
     Rows,
-    compare,
 )
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
@@ -90,7 +89,7 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
     """
     visits, chosen = now.task.visits, now.plan
     for rows, compared, plans in _try_plans(now):
-        best, _ = compared.choose()
+        best, _ = compared.choice
         if best:
             for v in rows:
                 chosen = chosen.as_in(plans[best - 1], v)
@@ -111,26 +110,17 @@ def _try_plans(
     task, made = now.task, [now]
     if now.plan.stops:
         made.append(task.predict(now.plan.without_stops()))
-    moves = _compare_plans(made, _moves_with_points(now))
+    moves = task.compare(made, _moves_with_points(now))
     finest, halved = resolution(task.tolerance), dict[Rows, MoveOutcomes]()
     if any(flank.open_kinds for flank in task.flanks):
-        open_ = [rows for rows, own in moves.items() if own.choose()[1] > finest]
+        open_ = [rows for rows, own in moves.items() if own.choice[1] > finest]
         plain = made[-1].plan
         own = plain.points.keys() & {v for rows in open_ for v in rows}
         made.append(task.predict(replace(plain, halved=frozenset(own))))
-        halved = _compare_plans(made, open_)
+        halved = task.compare(made, open_)
     plans = [one.plan for one in made]
     for rows, compared in moves.items():
         yield rows, halved.get(rows, compared), plans
-
-
-def _compare_plans(
-    made: Sequence[PathPrediction], moves: Sequence[Rows]
-) -> dict[Rows, MoveOutcomes]:
-    """Compare no points on moves with what some plans put there."""
-    task = made[0].task
-    plans = [one.predicted for one in (task.predict(InsertionPlan()), *made)]
-    return compare(plans, moves, task.tolerance)
 
 
 def _moves_with_points(now: PathPrediction) -> list[Rows]:
@@ -244,7 +234,7 @@ def _harmful(
 def _objections(now: PathPrediction) -> dict[int, Objection]:
     """Say which hypotheses make moves with points worse, and at what share."""
     found = dict[int, Objection]()
-    for rows, compared in _compare_plans((now,), _moves_with_points(now)).items():
+    for rows, compared in now.task.compare([now], _moves_with_points(now)).items():
         if (objection := compared.objection(1)) is not None:
             found[rows[int(objection.place)]] = objection
     return found

@@ -28,8 +28,8 @@ from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
 
-JointsAlong = Callable[[int, Floats], Floats]
-"""Joint angles (k, 6) [rad] at shares (k,) of the way to a visit."""
+JointsAlong = Callable[[Ints, Floats], Floats]
+"""Joint angles (k, 6) [rad] at shares (k,) of the ways to visits (k,)."""
 
 ROUNDED = 2e-6  # [m] that a point on a way may move where it is written anew
 TURNED = 2e-3  # [rad] .. and the tool turn: what drives turn it by is a tenth of that
@@ -144,10 +144,10 @@ def _points_of_lines(visits: Visits, put: PathPoints) -> dict[int, Floats]:
         return {}
     shares = [np.array(put.points[v]) for v in lines]
     count = [len(share) for share in shares]
-    numbers = between(visits, np.repeat(lines, count), np.concatenate(shares))
+    on, share = np.repeat(lines, count), np.concatenate(shares)
+    numbers = between(visits, on, share)
     if put.joints is not None:
-        q = [put.joints(v, share) for v, share in zip(lines, shares, strict=True)]
-        numbers = visits.dialect.count_flags(numbers, np.concatenate(q))
+        numbers = visits.dialect.count_flags(numbers, put.joints(on, share))
     tool = visits.dialect.poses(numbers)[:, :3, :3]
     turn = np.concatenate([put.turns(v) for v in lines])
     axis = np.einsum("kij,kj->ki", tool, turn)

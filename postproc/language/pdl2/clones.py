@@ -174,6 +174,8 @@ def _destination(program: Program, row: int, word: str, name: str) -> Span:
 def code_of(program: Program, line: int) -> str:
     """Return a physical line without its comment and line ending."""
     text = program.lines.source.line_text(line)
+    if "--" not in text:
+        return text
     scanned = scan_lines(text.encode("latin-1"), np.zeros(1, dtype=np.int32))
     comment = int(scanned.comment[0])
     return text if comment < 0 else text[:comment]

@@ -352,7 +352,8 @@ def _take_over(
 ) -> int:
     """Take over the edits that end before an offset; return how many."""
     count = 0
-    for (start, end), new in edits[at:]:
+    for k in range(at, len(edits)):
+        (start, end), new = edits[k]
         if until is not None and end > until:
             break
         found.append(Edit(Span(start - shift, end - shift), new))

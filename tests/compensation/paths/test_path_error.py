@@ -280,7 +280,7 @@ def test_a_case_is_where_the_error_is_with_a_joint_on_that_side(
     for case in own:
         joint, rows = case.joint - 1, case.rows
         side = np.array(cases.run.side[rows])
-        sides = [s for found, _, s in cases._sides(joint, cases._flanks[joint])
+        sides = [s for found, _, s in cases.open_sides().of(joint)
                  if found is kind]  # fmt: skip
         far = []
         for one in sides:

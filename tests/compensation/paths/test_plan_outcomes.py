@@ -33,8 +33,8 @@ class _Known(FlankCases):
 def program(off: float, *cases: FlankCase) -> Any:
     """A program of one move, as far off everywhere."""
     return SimpleNamespace(
-        way=WAY, cases=_Known(cases), samples_to=lambda v: slice(0, len(WAY)),
-        row_of=lambda v: 0,
+        way=WAY, cases=_Known(cases),
+        spans_to=lambda v: (np.zeros(len(v), int), np.full(len(v), len(WAY))),
         after=SimpleNamespace(across=np.full(len(WAY), off * MM)),
     )  # fmt: skip
 
@@ -62,7 +62,7 @@ def test_harm_is_counted_place_by_place_and_named() -> None:
         "it would be worse by 0.10 mm if joint 3 gives way elastically"
     )
     assert "how joint 3 changes its flank" in objection.cure
-    assert found.choose() == (0, pytest.approx(0.1 * MM))
+    assert found.choice == (0, pytest.approx(0.1 * MM))
     assert found.worst == pytest.approx(0.2 * MM)
     assert found.objection(0) is None
 
