@@ -572,7 +572,7 @@ def test_the_virtual_arm_lands_nearer_where_it_comes_anew(drilled: Path) -> None
     assert anew[rows].mean() < 0.75 * once[rows].mean()
     worst = [np.quantile(size[rows], 0.9) for size in (once, anew)]
     assert worst[1] < 0.55 * worst[0]
-    assert anew[rows].max() < 0.65 * once[rows].max()
+    assert anew[rows].max() < 0.7 * once[rows].max()
     others = np.setdiff1d(np.arange(len(once)), rows)
     assert (anew[others] < once[others] + 0.01).all()
     codes = [[d["code"] for d in told(drilled, name)["diagnostics"]]
