@@ -198,13 +198,13 @@ impl Settling<'_> {
                 self.core.error(state, tool)
             })
         };
-        let here = error(side);
+        let (here, answer) = (error(side), self.answer(i));
         std::array::from_fn(|j| {
             let step = if side[j] > 0.0 { -STEP } else { STEP };
             let mut other = *side;
             other[j] += step;
             let there = error(&other);
-            self.answer(i, &std::array::from_fn(|k| (here[k] - there[k]) / step))
+            answer(&std::array::from_fn(|k| (here[k] - there[k]) / step))
         })
     }
 
@@ -214,28 +214,30 @@ impl Settling<'_> {
         if missed.iter().all(|part| *part == 0.0) {
             return [0.0; 6];
         }
-        self.answer(i, &missed.map(|part| -part))
+        self.answer(i)(&missed.map(|part| -part))
     }
 
     /// How angles of a command change where its place does by something, if little.
-    fn answer(&self, i: usize, by: &Three) -> Six {
+    fn answer(&self, i: usize) -> impl Fn(&Three) -> Six + '_ {
         let q = &self.states.q[i];
         let mount = &self.tools[if self.tools.len() == 1 { 0 } else { i }];
-        let mut pose = self.commands[i];
-        for k in 0..3 {
-            pose[4 * k + 3] += by[k];
-        }
-        let slot = self.solver.slot(q);
-        let new = self.solver.nearest(&product(&pose, &inverted(mount)), q, slot);
-        let change: Six = std::array::from_fn(|m| new[m] - q[m]);
-        std::array::from_fn(|m| {
-            let answer = (0..6).map(|k| self.coupling[m][k] * change[k]).sum::<f64>();
-            if answer.is_nan() {
-                0.0
-            } else {
-                answer
+        let (slot, from_tcp) = (self.solver.slot(q), inverted(mount));
+        move |by| {
+            let mut pose = self.commands[i];
+            for k in 0..3 {
+                pose[4 * k + 3] += by[k];
             }
-        })
+            let new = self.solver.nearest(&product(&pose, &from_tcp), q, slot);
+            let change: Six = std::array::from_fn(|m| new[m] - q[m]);
+            std::array::from_fn(|m| {
+                let answer = (0..6).map(|k| self.coupling[m][k] * change[k]).sum::<f64>();
+                if answer.is_nan() {
+                    0.0
+                } else {
+                    answer
+                }
+            })
+        }
     }
 }
 
@@ -324,8 +326,8 @@ fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
 /// Args: the model and the inverse kinematics; commands (n, 4, 4) [m] and tools, likewise
 /// or (1, 4, 4); their states: joint angles of the commands, and the sides that they were
 /// made for; the ways that led to the visits; (6, 6), from joints to drives; which may be
-/// corrected for other sides, and which the arm passes, (n,); by what the path misses places and is to be bent,
-/// (n, 3) [m].
+/// corrected for other sides, and which the arm passes, (n,); by what the path misses
+/// places and is to be bent, (n, 3) [m].
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what a look has found
 pub fn next_aims<'py>(

@@ -370,12 +370,7 @@ class _WindowWork:
     quiet: Bools
     stops: Bools
 
-    def correct(
-        self,
-        own: Window,
-        before: Corrected | None,
-        clock: Clock,
-    ) -> Corrected:
+    def correct(self, own: Window, before: Corrected | None, clock: Clock) -> Corrected:
         """Correct a window; see `parallel.Work`.
 
         Where the arm comes from is foretold by many targets before, if it is not known.
@@ -467,8 +462,5 @@ def _lead(window: Window, before: Corrected | None) -> tuple[Boundary, Arrivals,
     if before is None or window.begin == 0:
         return FROM_START, UNLED, 0
     rows = slice(0, window.first - window.begin)
-    return (
-        Boundary(before.exit, before.trail.end[rows]),
-        before.arrivals,
-        before.doubtful,
-    )
+    lead = Boundary(before.exit, before.trail.end[rows])
+    return lead, before.arrivals, before.doubtful
