@@ -156,6 +156,7 @@ def to_move(
     wanted: Floats,
     corners: tuple[Ints, Ints, Ints],
     shares: tuple[Floats, Floats],
+    along: Floats,
     rounds: int,
 ) -> Floats: ...
 
@@ -169,9 +170,10 @@ def next_aims(
     ways: _Ways,
     coupling: Floats,
     free: Bools,
+    off: Bools,
     passes: Bools,
     missed: Floats,
-) -> Floats: ...
+) -> tuple[Floats, Floats, Floats]: ...
 
 # commands.rs: what to command (`postproc.compensation.inverse_model`)
 def commands(
@@ -192,7 +194,7 @@ def passed(
     tool: Floats,
     point: Floats,
     within: Floats,
-) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]: ...
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]: ...
 def rounded(
     edges: _Edges,
     share: Floats,

@@ -332,7 +332,9 @@ def test_rotation_vectors(random):
 def test_corners_that_pull(random):
     visit = np.setdiff1d(np.arange(1, 299), random.integers(0, 299, 60))
     shares = random.uniform(0, 0.125, (2, len(visit)))
-    pull = BlendCoupling(visit, visit - 1, visit + 1, *shares)
+    along = random.normal(size=(len(visit), 3))
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    pull = BlendCoupling(visit, visit - 1, visit + 1, *shares, along)
     wanted = random.normal(size=(300, 3))
     found = pull.to_move(wanted)
     assert np.allclose(found, paths.to_move(pull, wanted, ROUNDS), **CLOSE)

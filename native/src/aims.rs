@@ -4,15 +4,18 @@
 //! and behind. So sides are settled in the order of the program: at each target from what
 //! the ones before have become, to where aim and arrival are the same.
 
+use std::cell::OnceCell;
+
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
+use crate::bends::{answered, once, sum, Answer, Bends, Way};
 use crate::direction::place_in_play;
 use crate::lines::{poses, Pose};
 use crate::model::{Core, Rows, States};
 use crate::numeric::solve;
-use crate::play::{Clamp, Clamps};
+use crate::play::{is_near, Clamp, Clamps};
 use crate::pose::{inverted, product};
 use crate::rows::{array, each, flat, row, rows, Six, Three};
 use crate::solver::Solver;
@@ -21,12 +24,19 @@ use crate::terms::State;
 const STEP: f64 = 0.5; // of a side, by which the answer of a command is found
 const SETTLED: f64 = 1e-6; // sides that differ by less are the same
 const AGREES: f64 = 1e-3; // .. and need no other correction
-const GOES_ON: usize = 8; // looks along the answers, and as many from flanks
+const GOES_ON: usize = 4; // looks along the answers, and as many from flanks
 const NEWTON: usize = 6; // looks along their derivatives
+const SWEEPS: i32 = 5; // the later ones know what becomes of the target behind
+const FAR: usize = 6; // visits from what is reached from other sides, or bent
 const NEAR: f64 = 4.0; // halves of a play's width: a joint that moves farther may well leap
 const LEAP: f64 = 0.5; // of a side, from visit to visit
 const LEAPT: f64 = 0.1; // what a leap counts against what is off, both of a side
 const TINY: f64 = 1e-7; // of a side, for derivatives
+const SMALL: f64 = 1e-8; // [rad] and [m] that are not worth another look
+const LITTLE: f64 = 1e-4; // [m] by which the answer of angles is found
+const STAYS: Three = [0.0; 3];
+
+type Block<'py> = Bound<'py, PyArray2<f64>>;
 
 /// `Ways` of the package.
 #[derive(FromPyObject)]
@@ -38,6 +48,10 @@ pub struct Ways<'py> {
     play: Clamps<'py>,
     half: PyReadonlyArray1<'py, f64>,
     side: PyReadonlyArray2<'py, f64>,
+    targets: PyReadonlyArray2<'py, f64>,
+    places: PyReadonlyArray2<'py, f64>,
+    rounded: PyReadonlyArray2<'py, f64>,
+    corrected: PyReadonlyArray1<'py, bool>,
 }
 
 /// What it takes to settle sides, and what has become of the visits so far.
@@ -55,28 +69,60 @@ struct Settling<'a> {
     clamps: Vec<Clamp>,
     half: Six,
     found: &'a [Six],
-    free: &'a [bool],
+    /// Visits that may be corrected for other sides, and those that are reached from others.
+    free: Vec<bool>,
+    off: &'a [bool],
     passes: &'a [bool],
     /// By what the path misses places, and is to be bent.
     missed: &'a [Three],
-    /// What is known of the play at visits, as it becomes.
+    /// How angles answer where places move, and of which joints targets and corners tell the
+    /// ways to visits, of visits that were asked for.
+    answers: Vec<OnceCell<Answer>>,
+    told: Vec<OnceCell<[bool; 6]>>,
+    /// What is known of the play at visits, as it was found and as it becomes.
+    known: Vec<Clamp>,
     play: Vec<Clamp>,
-    /// What their angles change by.
-    shift: Vec<Six>,
-    /// What they are corrected for next.
+    /// What their angles change by, and those of targets whose corners are rounded.
+    bends: Bends<'a>,
+    /// How commands answer, of visits that may be corrected for other sides [m].
+    gains: Vec<Option<Gain>>,
+    /// What they are corrected for next, and from where they are reached then.
     aims: Vec<Six>,
+    reached: Vec<Six>,
+    /// The sweep that has changed something of them last.
+    changed: Vec<i32>,
 }
 
-/// How angles answer the sides that a target is corrected for, a row for each side.
-type Gain = [Six; 6];
+/// How the place of a command answers the sides that it is made for, a row for each side.
+type Gain = [Three; 6];
+
+/// What the arrival at a visit depends on, but for where it is passed.
+struct Look {
+    visit: usize,
+    /// The way there, None where nothing of it has moved, or several lead there.
+    way: Option<Way>,
+    /// Of which joints the way tells, and of which the plays told the sides.
+    told: [bool; 6],
+    known: [bool; 6],
+    moved: Three,
+}
 
 impl Settling<'_> {
     /// Tell whether all that is referred to is there.
     fn is_sound(&self) -> bool {
         let (n, e) = (self.aims.len(), self.clamps.len());
         let columns = [self.commands.len(), self.angles.len(), self.found.len()];
-        let others = [self.free.len(), self.passes.len(), self.missed.len(), self.play.len()];
-        columns.iter().chain(&others).all(|length| *length == n)
+        let others = [
+            self.free.len(),
+            self.off.len(),
+            self.passes.len(),
+            self.missed.len(),
+            self.known.len(),
+        ];
+        let bends = &self.bends;
+        let targets = [bends.targets.len(), bends.places.len()];
+        let corners = [bends.rounded.len(), bends.corrected.len()];
+        columns.iter().chain(&others).chain(&targets).chain(&corners).all(|length| *length == n)
             && (self.tools.len() == 1 || self.tools.len() == n)
             && self.first.len() == n + 1
             && self.first.windows(2).all(|pair| pair[0] <= pair[1])
@@ -85,39 +131,104 @@ impl Settling<'_> {
             && self.source.iter().all(|visit| *visit < n as i64)
     }
 
+    /// Find what is needed of the visits that move, before they do.
+    fn prepare(&mut self) {
+        let n = self.aims.len();
+        self.bends.before = (0..n).map(|i| self.before(i)).collect();
+        self.bends.begin();
+        let moves: Vec<bool> = (0..n).map(|i| self.off[i] || self.bent(i) != STAYS).collect();
+        let near = |i: usize| moves[i.saturating_sub(FAR)..n.min(i + FAR)].contains(&true);
+        self.free = (0..n).map(|i| self.free[i] && near(i)).collect();
+        for i in (0..n).filter(|i| moves[*i]) {
+            self.bends.pass(i, self.bent(i));
+            self.changed[i] = -1;
+        }
+    }
+
+    /// By what the path is to move for what it misses a visit by.
+    fn bent(&self, i: usize) -> Three {
+        self.missed[i].map(|part| -part)
+    }
+
+    /// The visit before one, where it alone leads there.
+    fn before(&self, i: usize) -> Option<usize> {
+        let edge = self.first[i] as usize;
+        let alone = self.first[i + 1] as usize == edge + 1 && self.source[edge] + 1 == i as i64;
+        if alone {
+            i.checked_sub(1)
+        } else {
+            None
+        }
+    }
+
+    /// Settle a visit anew, if what it depends on has changed since that was done.
+    fn sweep(&mut self, i: usize, round: i32) {
+        let near = i.saturating_sub(2)..(i + 3).min(self.changed.len());
+        if self.changed[near].iter().all(|at| *at < round - 1) {
+            return;
+        }
+        let (play, moved) = (self.play[i], self.bends.moved[i]);
+        self.aims[i] = self.settle(i);
+        if !play.is_near(&self.play[i], SMALL) || !is_near(&moved, &self.bends.moved[i], SMALL) {
+            self.changed[i] = round;
+        }
+    }
+
     /// Settle a visit; return the sides to correct it for.
     ///
     /// Looked for is what agrees next to its sides; of joints that hardly move on a way
     /// without a stop, next to those of the visit before: there may be several that agree,
     /// and a path should not leap to and fro.
     fn settle(&mut self, i: usize) -> Six {
-        let aim = self.states.side[i];
-        let (rests, bent) = ([0.0; 6], self.bent(i));
-        let still = self.arrived(i, &bent);
-        let (old, now) = (self.sides(i, &rests, &self.play[i]), self.sides(i, &bent, &still));
+        let (aim, last) = (self.states.side[i], self.aims[i]);
         let differs = |a: &Six, b: &Six| (0..6).any(|j| (a[j] - b[j]).abs() > AGREES);
-        // What plays do not tell stays as it was found.
-        let told: [bool; 6] = std::array::from_fn(|j| (old[j] - self.found[i][j]).abs() <= SETTLED);
-        let start: Six = std::array::from_fn(|j| if told[j] { now[j] } else { self.found[i][j] });
-        if !self.free[i] || !differs(&start, &aim) {
-            self.play[i] = still;
-            self.shift[i] = bent;
-            return aim;
+        let by = self.shift(i, &last);
+        let stays = by == STAYS && self.bends.is_quiet(i);
+        let look = self.look(i, stays);
+        let now = self.arrived(&look, &by);
+        if !self.free[i] || !differs(&now.0, &last) {
+            return self.pass(i, by, now, last);
         }
-        let gain = self.gain(i);
-        let answer = |next: &Six| -> Six {
-            let by = sum(&bent, &moved(&gain, next, &aim));
-            let sides = self.sides(i, &by, &self.arrived(i, &by));
-            std::array::from_fn(|j| if told[j] { sides[j] } else { self.found[i][j] })
-        };
+        if self.gains[i].is_none() {
+            self.gains[i] = Some(self.gain(i));
+        }
+        let look = if stays { self.look(i, false) } else { look };
         let near = self.near(i);
         let begin = std::array::from_fn(|j| near[j].unwrap_or(aim[j]));
         let weight = near.map(|side| if side.is_some() { LEAPT } else { 0.0 });
-        let next = agreed(answer, &begin, &weight);
-        let by = sum(&bent, &moved(&gain, &next, &aim));
-        self.play[i] = self.arrived(i, &by);
-        self.shift[i] = by;
-        next
+        let next = agreed(|next| self.arrived(&look, &self.shift(i, next)).0, &begin, &weight);
+        let by = self.shift(i, &next);
+        self.pass(i, by, self.arrived(&look, &by), next)
+    }
+
+    /// Pass a visit elsewhere by something; return the sides that it is corrected for.
+    fn pass(&mut self, i: usize, by: Three, arrived: (Six, Clamp), aim: Six) -> Six {
+        (self.reached[i], self.play[i]) = arrived;
+        self.bends.pass(i, by);
+        aim
+    }
+
+    /// By what the path is to pass a visit elsewhere, corrected for some sides.
+    fn shift(&self, i: usize, aim: &Six) -> Three {
+        let bent = self.bent(i);
+        let by = self.gains[i].map(|gain| moved(&gain, aim, &self.states.side[i]));
+        by.map_or(bent, |by| sum(&bent, &by))
+    }
+
+    /// Gather what the arrival at a visit depends on; `stays`: and nothing of it has moved.
+    fn look(&self, i: usize, stays: bool) -> Look {
+        let answer = |k: usize| once(&self.answers, k, || self.answer(k));
+        let way = if stays { None } else { Way::to(i, &self.bends, &answer, false) };
+        let told = || {
+            let (source, rest) = (self.bends.before[i]?, Way::to(i, &self.bends, &answer, true)?);
+            Some(rest.tells(&self.angles[source], &self.clamps[self.first[i] as usize]))
+        };
+        let none = [false; 6];
+        let told = way.as_ref().map_or(none, |_| once(&self.told, i, || told().unwrap_or(none)));
+        let (known, at, half) = (&self.known[i], &self.angles[i], &self.half);
+        let side = |j: usize| place_in_play(at[j], known.lo[j], known.hi[j], half[j]);
+        let known = std::array::from_fn(|j| (side(j) - self.found[i][j]).abs() <= SETTLED);
+        Look { visit: i, way, told, known, moved: self.bends.moved[i] }
     }
 
     /// The sides of the visit that alone leads to one, of joints that hardly move on a way
@@ -135,35 +246,61 @@ impl Settling<'_> {
         })
     }
 
-    fn sides(&self, i: usize, by: &Six, play: &Clamp) -> Six {
-        let (angles, half) = (&self.angles[i], &self.half);
-        std::array::from_fn(|j| place_in_play(angles[j] + by[j], play.lo[j], play.hi[j], half[j]))
+    /// The sides of a visit that is passed elsewhere by something, and what is known there
+    /// of the play.
+    ///
+    /// What plays did not tell stays as it was found.
+    fn arrived(&self, look: &Look, by: &Three) -> (Six, Clamp) {
+        let (play, here) = self.led_to(look, by);
+        let (found, half) = (&self.found[look.visit], &self.half);
+        let side = |j: usize| place_in_play(here[j], play.lo[j], play.hi[j], half[j]);
+        (std::array::from_fn(|j| if look.known[j] { side(j) } else { found[j] }), play)
     }
 
-    /// What is known of the play at a visit whose angles change by something.
-    fn arrived(&self, i: usize, by: &Six) -> Clamp {
-        let here: Six = std::array::from_fn(|j| self.angles[i][j] + by[j]);
-        let within = Clamp::passing(&here, &self.half);
+    /// What is known of the play at such a visit, and its angles.
+    fn led_to(&self, look: &Look, by: &Three) -> (Clamp, Six) {
+        let (i, half) = (look.visit, &self.half);
         let edges = self.first[i] as usize..self.first[i + 1] as usize;
-        if edges.is_empty() {
-            return self.play[i];
+        if let (Some(way), Some(source)) = (&look.way, self.bends.before[i]) {
+            let (mut clamp, here) = way.at(by, &look.moved);
+            if look.told.contains(&false) {
+                let led = self.led(edges.start, source, i, by);
+                for j in (0..6).filter(|j| !look.told[*j]) {
+                    (clamp.lo[j], clamp.hi[j]) = (led.lo[j], led.hi[j]);
+                }
+            }
+            return (self.play[source].then(&clamp).then(&Clamp::passing(&here, half)), here);
         }
+        let here = sum(&self.angles[i], &self.answered(i, by));
+        if edges.is_empty() {
+            return (self.known[i], here);
+        }
+        let within = Clamp::passing(&here, half);
         let mut found: Option<Clamp> = None;
         for edge in edges {
             let Ok(source) = usize::try_from(self.source[edge]) else {
-                return if i == 0 { self.play[i] } else { within };
+                return (if i == 0 { self.known[i] } else { within }, here);
             };
             let way = self.led(edge, source, i, by);
             let arrived = self.play[source].then(&way).then(&within);
             found = Some(found.map_or(arrived, |other| other.hull(&arrived)));
         }
-        found.unwrap_or(within)
+        (found.unwrap_or(within), here)
     }
 
-    /// The clamp of a way whose both ends have moved.
-    fn led(&self, edge: usize, source: usize, i: usize, by: &Six) -> Clamp {
+    /// What angles change by where a visit is passed elsewhere by something.
+    fn answered(&self, i: usize, by: &Three) -> Six {
+        if *by == STAYS {
+            return [0.0; 6];
+        }
+        answered(&once(&self.answers, i, || self.answer(i)), by)
+    }
+
+    /// The same from both of its ends alone, where corners do not tell of it.
+    fn led(&self, edge: usize, source: usize, i: usize, by: &Three) -> Clamp {
         let (begin, end) = (&self.angles[source], &self.angles[i]);
-        let from = &self.shift[source];
+        let from = self.answered(source, &self.bends.shift[source]);
+        let by = self.answered(i, by);
         let (way, half) = (&self.clamps[edge], &self.half);
         let along = |x: f64, j: usize| {
             let part = (x - begin[j]) / (end[j] - begin[j]);
@@ -188,7 +325,7 @@ impl Settling<'_> {
         out
     }
 
-    /// Find how the angles of a command answer the sides that it is made for.
+    /// Find how the place of a command answers the sides that it is made for.
     fn gain(&self, i: usize) -> Gain {
         let s = &self.states;
         let (q, side, tool) = (&s.q[i], &s.side[i], s.tool(i));
@@ -198,37 +335,26 @@ impl Settling<'_> {
                 self.core.error(state, tool)
             })
         };
-        let (here, answer) = (error(side), self.answer(i));
+        let here = error(side);
         std::array::from_fn(|j| {
             let step = if side[j] > 0.0 { -STEP } else { STEP };
             let mut other = *side;
             other[j] += step;
             let there = error(&other);
-            answer(&std::array::from_fn(|k| (here[k] - there[k]) / step))
+            std::array::from_fn(|k| (here[k] - there[k]) / step)
         })
     }
 
-    /// How angles change where corners are bent by what they are missed by.
-    fn bent(&self, i: usize) -> Six {
-        let missed = &self.missed[i];
-        if missed.iter().all(|part| *part == 0.0) {
-            return [0.0; 6];
-        }
-        self.answer(i)(&missed.map(|part| -part))
-    }
-
-    /// How angles of a command change where its place does by something, if little.
-    fn answer(&self, i: usize) -> impl Fn(&Three) -> Six + '_ {
+    /// How angles of a command change where its place does, if little.
+    fn answer(&self, i: usize) -> Answer {
         let q = &self.states.q[i];
         let mount = &self.tools[if self.tools.len() == 1 { 0 } else { i }];
         let (slot, from_tcp) = (self.solver.slot(q), inverted(mount));
-        move |by| {
+        std::array::from_fn(|k| {
             let mut pose = self.commands[i];
-            for k in 0..3 {
-                pose[4 * k + 3] += by[k];
-            }
+            pose[4 * k + 3] += LITTLE;
             let new = self.solver.nearest(&product(&pose, &from_tcp), q, slot);
-            let change: Six = std::array::from_fn(|m| new[m] - q[m]);
+            let change: Six = std::array::from_fn(|m| (new[m] - q[m]) / LITTLE);
             std::array::from_fn(|m| {
                 let answer = (0..6).map(|k| self.coupling[m][k] * change[k]).sum::<f64>();
                 if answer.is_nan() {
@@ -237,16 +363,12 @@ impl Settling<'_> {
                     answer
                 }
             })
-        }
+        })
     }
 }
 
-fn sum(a: &Six, b: &Six) -> Six {
-    std::array::from_fn(|j| a[j] + b[j])
-}
-
-/// What angles change by where another side is aimed for.
-fn moved(gain: &Gain, next: &Six, aim: &Six) -> Six {
+/// What a command moves by where other sides are aimed for.
+fn moved(gain: &Gain, next: &Six, aim: &Six) -> Three {
     std::array::from_fn(|m| (0..6).map(|j| gain[j][m] * (next[j] - aim[j])).sum())
 }
 
@@ -309,9 +431,12 @@ fn to_flanks(step: &Six, weight: &Six) -> Six {
     })
 }
 
-/// The step of Newton's method; where there is none, half of the way.
+/// The step of Newton's method; where there is none, half of the way. What agrees stays.
 fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
     let columns = std::array::from_fn(|j| {
+        if step[j].abs() <= SETTLED {
+            return std::array::from_fn(|m| f64::from(u8::from(m == j)));
+        }
         let mut other = *at;
         let by = if at[j] > 0.0 { -TINY } else { TINY };
         other[j] += by;
@@ -321,12 +446,14 @@ fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
     solve(columns, *step).unwrap_or_else(|| step.map(|part| part / 2.0))
 }
 
-/// Find the sides that n targets are to be corrected for, (n, 6), from the last look.
+/// Find the sides that n targets are to be corrected for, and those that they are reached
+/// from then, (n, 6), from the last look, and by what the path then passes them farther than
+/// they move, (n, 3) [m].
 ///
 /// Args: the model and the inverse kinematics; commands (n, 4, 4) [m] and tools, likewise
 /// or (1, 4, 4); their states: joint angles of the commands, and the sides that they were
 /// made for; the ways that led to the visits; (6, 6), from joints to drives; which may be
-/// corrected for other sides, and which the arm passes, (n,); by what the path misses
+/// corrected for other sides, which are reached from others, and which the arm passes, (n,); by what the path misses
 /// places and is to be bent, (n, 3) [m].
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what a look has found
@@ -340,12 +467,25 @@ pub fn next_aims<'py>(
     ways: Ways<'py>,
     coupling: PyReadonlyArray2<'py, f64>,
     free: PyReadonlyArray1<'py, bool>,
+    off: PyReadonlyArray1<'py, bool>,
     passes: PyReadonlyArray1<'py, bool>,
     missed: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<(Block<'py>, Block<'py>, Block<'py>)> {
     let odd = |_| PyIndexError::new_err("six rows of six");
-    let (states, play) = (states.rows(core)?, ways.play.list()?);
-    let n = states.len();
+    let (states, known) = (states.rows(core)?, ways.play.list()?);
+    let (n, half, angles) = (states.len(), row(&ways.half)?, rows::<6>(&ways.angles)?);
+    let bends = Bends {
+        targets: rows::<6>(&ways.targets)?,
+        passed: angles,
+        places: rows::<3>(&ways.places)?,
+        rounded: rows::<7>(&ways.rounded)?,
+        corrected: flat(&ways.corrected)?,
+        before: Vec::new(),
+        half,
+        shift: vec![STAYS; n],
+        moved: vec![STAYS; n],
+        corners: Vec::new(),
+    };
     let mut settling = Settling {
         core,
         solver,
@@ -354,21 +494,34 @@ pub fn next_aims<'py>(
         aims: states.side.to_vec(),
         states,
         coupling: rows::<6>(&coupling)?.to_vec().try_into().map_err(odd)?,
-        angles: rows::<6>(&ways.angles)?,
+        angles,
         first: flat(&ways.first)?,
         source: flat(&ways.source)?,
         clamps: ways.clamps.list()?,
-        half: row(&ways.half)?,
+        half,
         found: rows::<6>(&ways.side)?,
-        free: flat(&free)?,
+        free: flat(&free)?.to_vec(),
+        off: flat(&off)?,
         passes: flat(&passes)?,
         missed: rows::<3>(&missed)?,
-        play,
-        shift: vec![[0.0; 6]; n],
+        answers: vec![OnceCell::new(); n],
+        told: vec![OnceCell::new(); n],
+        play: known.clone(),
+        known,
+        bends,
+        gains: vec![None; n],
+        reached: rows::<6>(&ways.side)?.to_vec(),
+        changed: vec![-2; n],
     };
     if !settling.is_sound() {
         return Err(PyIndexError::new_err("visits or edges that are not there"));
     }
-    each(py, n, |i| settling.aims[i] = settling.settle(i))?;
-    Ok(array(py, settling.aims))
+    settling.prepare();
+    for round in 0..SWEEPS {
+        each(py, n, |i| settling.sweep(i, round))?;
+    }
+    let bends = &settling.bends;
+    let farther = (0..n).map(|i| std::array::from_fn(|k| bends.shift[i][k] - bends.moved[i][k]));
+    let farther: Vec<Three> = farther.collect();
+    Ok((array(py, settling.aims), array(py, settling.reached), array(py, farther)))
 }

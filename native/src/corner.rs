@@ -14,6 +14,7 @@ const ROUNDS: usize = 5; // of Newton's method
 const FLAT: f64 = 4e-5; // [rad] bend below which moves are as good as straight
 const REFINED: usize = 2; // rounds for the others
 const STEP: f64 = 0.02; // in s
+const SHORT: f64 = 1e-12; // [m] a way that leads nowhere
 
 /// `Zones` of the package.
 #[derive(FromPyObject)]
@@ -47,6 +48,7 @@ struct Passed {
     nearest: f64,
     q: Six,
     aside: Three,
+    along: Three,
     bend: Six,
 }
 
@@ -150,8 +152,8 @@ impl<'a, 'b> Group<'a, 'b> {
 
     /// Find where the paths pass their points within a distance: a smaller zone if need be.
     #[inline(always)]
-    fn pass(&mut self, within: &[f64]) -> ([Six; SIDE], Lanes, [Lanes; 3]) {
-        let (mut nearest, miss) = self.passing();
+    fn pass(&mut self, within: &[f64]) -> ([Six; SIDE], Lanes, [Lanes; 3], [Lanes; 3]) {
+        let (mut nearest, miss, mut ends) = self.passing();
         let mut shrunk = false;
         for (lane, corner) in self.corners.iter_mut().enumerate() {
             if miss[lane] > within[lane] {
@@ -162,7 +164,7 @@ impl<'a, 'b> Group<'a, 'b> {
             }
         }
         if shrunk {
-            (nearest, _) = self.passing();
+            (nearest, _, ends) = self.passing();
         }
         let mut bend = [[0.0; 6]; SIDE];
         for (bend, corner) in bend.iter_mut().zip(self.corners.iter()) {
@@ -173,12 +175,12 @@ impl<'a, 'b> Group<'a, 'b> {
             let refined = self.refined(nearest);
             nearest = std::array::from_fn(|k| if bent[k] { refined[k] } else { nearest[k] });
         }
-        (bend, nearest, self.off_at(&nearest))
+        (bend, nearest, self.off_at(&nearest), along_parabola(&ends[0], &ends[1], &nearest))
     }
 
-    /// Find where the corners pass closest, and how far off.
+    /// Find where the corners pass closest, how far off, and both of their ends.
     #[inline(always)]
-    fn passing(&self) -> (Lanes, Lanes) {
+    fn passing(&self) -> (Lanes, Lanes, [[Lanes; 3]; 2]) {
         let (mut first, mut last) = ([[0.0; SIDE]; 6], [[0.0; SIDE]; 6]);
         for (lane, corner) in self.corners.iter().enumerate() {
             let ends = corner.ends();
@@ -187,7 +189,7 @@ impl<'a, 'b> Group<'a, 'b> {
         }
         let (begin, end) = (self.off(&first), self.off(&last));
         let s = nearest_on_parabola(&begin, &end);
-        (s, far(&on_parabola(&begin, &end, &s)))
+        (s, far(&on_parabola(&begin, &end, &s)), [begin, end])
     }
 
     /// Improve the nearest points where the moves are not straight.
@@ -257,6 +259,19 @@ fn on_parabola(b: &[Lanes; 3], e: &[Lanes; 3], s: &Lanes) -> [Lanes; 3] {
     x
 }
 
+/// Say where a parabola leads at s.
+#[inline(always)]
+fn along_parabola(b: &[Lanes; 3], e: &[Lanes; 3], s: &Lanes) -> [Lanes; 3] {
+    let mut way = [[0.0; SIDE]; 3];
+    for k in 0..3 {
+        for lane in 0..SIDE {
+            way[k][lane] = e[k][lane] * s[lane] - b[k][lane] * (1.0 - s[lane]);
+        }
+    }
+    let length = far(&way);
+    way.map(|part| std::array::from_fn(|lane| part[lane] / length[lane].max(SHORT)))
+}
+
 /// Find the s at which begin (1 - s)^2 + end s^2 is shortest.
 #[inline(always)]
 fn nearest_on_parabola(b: &[Lanes; 3], e: &[Lanes; 3]) -> Lanes {
@@ -293,13 +308,14 @@ fn nearest_on_parabola(b: &[Lanes; 3], e: &[Lanes; 3]) -> Lanes {
 /// Find where the path passes corners.
 #[inline(always)]
 fn pass(mut group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
-    let (bend, nearest, off) = group.pass(within);
+    let (bend, nearest, off, along) = group.pass(within);
     let one = |(lane, corner): (usize, &Corner<'_>)| Passed {
         before: corner.before,
         behind: corner.behind,
         nearest: nearest[lane],
         q: corner.at(nearest[lane]),
         aside: off.map(|of| of[lane]),
+        along: along.map(|of| of[lane]),
         bend: bend[lane],
     };
     group.corners.iter().enumerate().map(one).collect()
@@ -327,7 +343,8 @@ type Block<'py> = Bound<'py, PyArray2<f64>>;
 
 /// Find where the path passes c corners, `within` a distance [m] of their points.
 ///
-/// Returns: before, behind, nearest (c,), q (c, 6), aside (c, 3), bend (c, 6).
+/// Returns: before, behind, nearest (c,), q (c, 6), from the points to there and the direction
+/// of the path there (c, 3), bend (c, 6).
 #[pyfunction]
 #[allow(clippy::too_many_arguments, clippy::type_complexity)]
 pub fn passed<'py>(
@@ -339,7 +356,8 @@ pub fn passed<'py>(
     tool: PyReadonlyArray2<'py, f64>,
     point: PyReadonlyArray2<'py, f64>,
     within: PyReadonlyArray1<'py, f64>,
-) -> PyResult<(Column<'py>, Column<'py>, Column<'py>, Block<'py>, Block<'py>, Block<'py>)> {
+) -> PyResult<(Column<'py>, Column<'py>, Column<'py>, Block<'py>, Block<'py>, Block<'py>, Block<'py>)>
+{
     let (chain, paths) = (Chain::new(&parameters)?, Paths::of(&edges, &q)?);
     let (tool, point, within) = (rows::<3>(&tool)?, rows::<3>(&point)?, flat(&within)?);
     let corners = zones.corners(&paths)?;
@@ -364,6 +382,7 @@ pub fn passed<'py>(
         column(|p| p.nearest),
         array(py, found.iter().map(|p| p.q).collect()),
         array(py, found.iter().map(|p| p.aside).collect()),
+        array(py, found.iter().map(|p| p.along).collect()),
         array(py, found.iter().map(|p| p.bend).collect()),
     ))
 }

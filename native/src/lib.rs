@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 
 mod aims;
 mod aligned;
+mod bends;
 mod chain;
 mod commands;
 mod compare;

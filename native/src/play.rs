@@ -32,6 +32,11 @@ pub struct Clamp {
     pub hi: Six,
 }
 
+/// Tell whether numbers are the same within something.
+pub fn is_near<const K: usize>(a: &[f64; K], b: &[f64; K], most: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| a == b || (a - b).abs() <= most)
+}
+
 impl Clamp {
     pub const IDENTITY: Clamp = Clamp { lo: [f64::NEG_INFINITY; 6], hi: [f64::INFINITY; 6] };
 
@@ -48,6 +53,11 @@ impl Clamp {
         let through =
             |z: &Six| std::array::from_fn(|j| smaller(larger(z[j], after.lo[j]), after.hi[j]));
         Clamp { lo: through(&self.lo), hi: through(&self.hi) }
+    }
+
+    /// Tell whether another one is the same within some angle.
+    pub fn is_near(&self, other: &Clamp, most: f64) -> bool {
+        is_near(&self.lo, &other.lo, most) && is_near(&self.hi, &other.hi, most)
     }
 
     /// Return the hull of two intervals.

@@ -17,12 +17,14 @@ pub fn to_move<'py>(
     wanted: PyReadonlyArray2<'py, f64>,
     corners: (Column<'py, i64>, Column<'py, i64>, Column<'py, i64>),
     shares: (Column<'py, f64>, Column<'py, f64>),
+    along: PyReadonlyArray2<'py, f64>,
     rounds: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let wanted = rows::<3>(&wanted)?;
     let (visit, before, behind) = (flat(&corners.0)?, flat(&corners.1)?, flat(&corners.2)?);
     let (v, w) = (flat(&shares.0)?, flat(&shares.1)?);
-    let count = [visit.len(), before.len(), behind.len(), v.len(), w.len()];
+    let along = rows::<3>(&along)?;
+    let count = [visit.len(), before.len(), behind.len(), v.len(), w.len(), along.len()];
     let count = same_length(&count)?;
     let places = 0..wanted.len() as i64;
     if [visit, before, behind].iter().any(|c| c.iter().any(|at| !places.contains(at))) {
@@ -35,11 +37,18 @@ pub fn to_move<'py>(
             let (aim, here) = (&wanted[at], &moved[at]);
             let (first, last) = (&moved[before[c] as usize], &moved[behind[c] as usize]);
             let pulled = |k: usize| v[c] * (first[k] - here[k]) + w[c] * (last[k] - here[k]);
-            std::array::from_fn(|k| aim[k] - pulled(k))
+            let pulled = across(&std::array::from_fn(pulled), &along[c]);
+            std::array::from_fn(|k| aim[k] - pulled[k])
         })?;
         for (c, next) in next.iter().enumerate() {
             moved[visit[c] as usize] = *next;
         }
     }
     Ok(array(py, moved))
+}
+
+/// The part of something across a direction.
+pub fn across(by: &Three, along: &Three) -> Three {
+    let part: f64 = (0..3).map(|k| by[k] * along[k]).sum();
+    std::array::from_fn(|k| by[k] - part * along[k])
 }

@@ -26,6 +26,10 @@ class Ways:
         play: What is known of the play's state at the visits, (n, 6) [rad].
         half: Half of the width of the play, (6,) [rad].
         side: Where the joints lie in it, (n, 6).
+        targets: The same angles at the targets themselves, (n, 6) [rad].
+        places: Where these are, (n, 3) [m].
+        rounded: Their corners, (n, 7), see `BlendCoupling`.
+        corrected: The targets that may move, (n,).
     """
 
     angles: Floats
@@ -35,16 +39,38 @@ class Ways:
     play: PlayOperator
     half: Floats
     side: Floats
+    targets: Floats
+    places: Floats
+    rounded: Floats
+    corrected: Bools
 
     @classmethod
-    def of(cls, looked: Replanned) -> Ways:
+    def of(cls, looked: Replanned, corrected: Bools) -> Ways:
         """Take the ways of a look."""
         arm, passed = looked.arm, looked.passages
         chains = chains_of(looked.passed, arm.coupling, passed.first, passed.source)
         return cls(
             floats(chains.angles), chains.first, chains.source, passed.clamps,
             looked.sides.play, half_width(arm), floats(looked.side),
+            floats(looked.exact.q @ arm.coupling.T), floats(looked.places),
+            looked.rounded, corrected,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NextAims:
+    """What n targets are to be corrected for next.
+
+    Attributes:
+        sides: The sides, (n, 6).
+        reached: Those that they are reached from then, (n, 6): the same, but where none
+            agree.
+        farther: By what the path then passes them farther than they move, (n, 3) [m].
+    """
+
+    sides: Floats
+    reached: Floats
+    farther: Floats
 
 
 def next_aims(
@@ -52,10 +78,12 @@ def next_aims(
     solved: Commands,
     states: States,
     looked: Replanned,
+    corrected: Bools,
     free: Bools,
+    off: Bools,
     missed: Floats,
-) -> Floats:
-    """Find the sides at which aim and arrival agree, target after target, (n, 6).
+) -> NextAims:
+    """Find the sides at which aim and arrival agree, target after target.
 
     A correction moves its target, and so the place of every joint in its play there and
     behind: by as much as the play is wide. A target is settled with what the ones
@@ -73,14 +101,18 @@ def next_aims(
         solved: The commands of n visits.
         states: Their states, with tools.
         looked: Where these commands lead.
+        corrected: The targets that move, (n,).
         free: Which may be corrected for other sides, (n,).
+        off: .. and which are reached from others, (n,).
         missed: By what the path misses places, and is to be bent, (n, 3) [m].
     """
     arm, evaluator = looked.arm, model.evaluator(looked.arm)
+    ways = Ways.of(looked, corrected)
     here = states.with_(q=solved.q, direction=solved.direction)
     fly = np.ascontiguousarray(looked.targets.fly)
     poses = floats(solved.command), floats(few_rows(looked.targets.tool))
-    return _native.next_aims(
-        evaluator.core, arm.solver, *poses, evaluator.states(here), Ways.of(looked),
-        floats(arm.coupling), free, fly, floats(missed),
+    found = _native.next_aims(
+        evaluator.core, arm.solver, *poses, evaluator.states(here), ways,
+        floats(arm.coupling), free, off, fly, floats(missed),
     )  # fmt: skip
+    return NextAims(*found)

@@ -27,7 +27,7 @@ class Snapshot:
         reasons: See `Decisions`.
         correction: (k, 3) [m].
         aim: Sides that are corrected for, (k, 6).
-        bent, left: As in `SolverState`: (k, 3) [m]; held, swung, settled, (k, 3).
+        foretold, left: `SolverState.aside`, (k, 3) [m]; held, swung, settled, (k, 3).
         q, passed: Joint angles at the target and where it is passed, (k, 6) [rad].
         aside: From the one to the other, (k, 3) [m].
         slot: Branch, (k,).
@@ -41,7 +41,7 @@ class Snapshot:
     reasons: tuple[Reason, ...]
     correction: Floats
     aim: Floats
-    bent: Floats
+    foretold: Floats
     left: Bools
     q: Floats
     passed: Floats

@@ -18,7 +18,7 @@ from postproc.arrays import (
     spans,
     take_rows,
 )
-from postproc.compensation.aims import next_aims
+from postproc.compensation.aims import NextAims, next_aims
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.arc_turns import ArcTurns
 from postproc.compensation.consensus import (
@@ -70,7 +70,8 @@ class SolverState:
     Attributes:
         solved: The commands.
         departure: How far they lead the arm from where it was.
-        bent: What rounded points are moved by beyond what is foretold, (n, 3) [m].
+        aside: From targets to where the path is foretold to pass them, (n, 3) [m].
+        reached: The sides that they are foretold to be reached from, (n, 6).
         held: Targets that keep their values for the side they are reached from, (n,).
         swung: .. for the ways to or from them, (n,).
         settled: Targets whose sides changed till the last round, and may, or that are
@@ -79,22 +80,22 @@ class SolverState:
 
     solved: Commands
     departure: JointDeviation
-    bent: Floats
+    aside: Floats
+    reached: Floats
     held: Bools
     swung: Bools
     settled: Bools
 
-    def find_flank_changes(
-        self, proposal: Proposal, side: Floats, most: float
-    ) -> Bools:
-        """Tell which corrected targets are reached from other sides than these, (n,).
+    def find_off(self, proposal: Proposal, side: Floats, late: bool) -> Bools:
+        """Tell which corrected targets are reached from sides not foretold, (n,).
 
         Args:
             proposal: Tells which are corrected.
             side: From where they are reached, (n, 6).
-            most: How far that may be off.
+            late: Only those that are reached from other sides than corrected for.
         """
-        off = np.abs(side - self.solved.direction)
+        wanted, most = (self.solved.direction, OTHER) if late else (self.reached, SAME)
+        off = np.abs(side - wanted)
         far = np.zeros(len(off), dtype=bool)
         rows = np.unique(np.flatnonzero(off > most) // off.shape[1])  # few
         far[rows] = largest_in_rows(off[rows]) > most  # NaN is not far
@@ -138,8 +139,11 @@ class Iteration:
             )  # fmt: skip
             solved = self._keep_sides(solved, solved.known, states)
             departed = self.measure_deviation(solved, np.arange(len(self.states)))
-        bent = np.zeros_like(self.planned.plan.aside)
-        return SolverState(solved, departed, bent, none, none, meant)
+        plan = self.planned.plan
+        wanted = solved.command[:, :3, 3] - plan.tcp[:, :3, 3]
+        aside = passing_after(plan, np.nan_to_num(wanted))
+        given = solved, departed, aside, solved.direction
+        return SolverState(*given, none, none, meant)
 
     def _keep_sides(self, solved: Commands, rows: Bools, states: States) -> Commands:
         """Let axes near 0 stay on the side that flags name."""
@@ -164,55 +168,55 @@ class Iteration:
         self,
         current: SolverState,
         looked: Replanned,
-        moved: Bools,
+        corrected: Bools,
+        off: Bools,
         missed: Floats,
-        number: int,
-    ) -> Floats:
-        """Give the sides to correct some targets for next, (n, 6).
+        late: bool,
+    ) -> NextAims:
+        """Give the sides to correct targets for next, see `next_aims`.
 
-        Targets of a fly run move each other, so that later steps go half of the way.
+        Where too many rounds have not settled them, it is the middle.
         """
         solved, tool = current.solved, self.planned.plan.tool[:, :3, 3]
-        if number >= IN_ORDER:
-            return (solved.direction + looked.side) / 2
+        free = corrected & (off | ~current.settled)
         with self.setting.clock("solve"):
             given = self.setting.model, solved, self.states.with_(tool=tool), looked
-            return next_aims(*given, moved, missed)
+            found = next_aims(*given, corrected, free, off, missed)
+        if not late:
+            return found
+        middle = (solved.direction + looked.side) / 2
+        return replace(found, sides=np.where(off[:, None], middle, found.sides))
 
     def next_aim(
-        self, current: SolverState, moved: Bools, sides: Floats
+        self, current: SolverState, found: NextAims, missed: Floats
     ) -> SolverState:
-        """Correct some targets for other sides."""
-        setting = self.setting
+        """Correct targets for other sides, and bend the path where it misses places."""
+        setting, old = self.setting, current.solved
+        moved = any_in_rows(found.sides != old.direction)
         with setting.clock("solve"):
-            states = self.states.with_(direction=sides)
+            states = self.states.with_(direction=found.sides)
             solved = solve_again(
-                current.solved, moved, setting.model, setting.cell, self.planned,
-                states, setting.options.orientation,
+                old, moved, setting.model, setting.cell, self.planned, states,
+                setting.options.orientation,
             )  # fmt: skip
             solved = self._keep_sides(solved, moved, states)
             rows = np.flatnonzero(moved)
             departed = current.departure.with_rows(
                 rows, self.measure_deviation(solved, rows)
             )
-        return replace(current, solved=solved, departure=departed)
+        aside = current.aside + missed + found.farther
+        return replace(
+            current, solved=solved, departure=departed, aside=aside,
+            reached=found.reached,
+        )  # fmt: skip
 
-    def propose(self, current: SolverState) -> tuple[Proposal, Floats]:
-        """Decide on numbers; return too where the path is to pass its targets."""
+    def propose(self, current: SolverState) -> Proposal:
+        """Decide on numbers."""
         with self.setting.clock("decide"):
-            plan = self.planned.plan
-            aside = passing_after(plan, self.find_wanted_shifts(current)) + current.bent
             given = self.reading, self.beforehand, self.planned, self.states
-            found = current.solved, current.departure, aside
+            found = current.solved, current.departure, current.aside
             left = current.held, current.swung
-            return Round(*given, *found, *left, self.setting).propose(), aside
-
-    def find_wanted_shifts(self, current: SolverState) -> Floats:
-        """Say what the path should move by at every target, (n, 3) [m]."""
-        before = self.planned.plan.tcp[:, :3, 3]
-        wanted = np.nan_to_num(current.solved.command[:, :3, 3] - before)
-        wanted[current.held | current.swung] = 0.0
-        return wanted
+            return Round(*given, *found, *left, self.setting).propose()
 
     def measure_misses(
         self, proposal: Proposal, aside: Floats, meant: Floats, number: int
@@ -325,12 +329,11 @@ class Replanner:
 
 # Correct and plan again, until the sides are those corrected for.
 
-ROUNDS = 6  # of correcting for changed sides, before targets are settled for
-IN_ORDER = 4  # rounds that settle sides in the program's order
+ROUNDS = 3  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
-CORNERS = 3  # rounds that bend the way at all corners; later where it is far off alone
-FINE = 1e-7  # [m] how well rounded fly points are hit by then
+CORNERS = 2  # rounds that bend the way at all corners; later where it is far off alone
+FINE = 2e-7  # [m] how well rounded fly points are hit by then
 LAST = 2  # rounds of that behind the last one of other sides
 NEAR = 1e-7  # [mm, deg] that numbers may be off where the way is looked at
 
@@ -415,23 +418,23 @@ def iterate(
     course = _Course(iteration, replanner, lead, trail)
     current, number = iteration.first_aim(), 0
     for turn in count():  # ends: from round ROUNDS on, `settled` or `held` grows
-        proposal, meant = iteration.propose(current)
+        proposal, late = iteration.propose(current), number >= ROUNDS
         looked = course.look(current, proposal, turn)
-        most = SAME if number < ROUNDS else OTHER
-        moved = current.find_flank_changes(proposal, looked.side, most)
-        missed = iteration.measure_misses(proposal, looked.aside, meant, number)
-        if not (moved.any() or missed.any()):
-            found, flipped = _read_back(course, current, proposal)
-            swung = iteration.find_limit_violations(proposal, found)
-            if found is not None and not swung.any():
-                return found
+        off = current.find_off(proposal, looked.side, late)
+        missed = iteration.measure_misses(proposal, looked.aside, current.aside, number)
+        if not (off.any() or missed.any()):
+            done, flipped = _read_back(course, current, proposal)
+            swung = iteration.find_limit_violations(proposal, done)
+            if done is not None and not swung.any():
+                return done
             held, swung = current.held | flipped, current.swung | swung
             current, number = replace(current, held=held, swung=swung), CORNERS
             continue
-        settled = current.settled | moved if number >= ROUNDS else current.settled
-        current = replace(current, bent=current.bent + missed, settled=settled)
-        sides = iteration.find_aims(current, looked, moved, missed, number)
-        current, number = iteration.next_aim(current, moved, sides), number + 1
+        if late:
+            current = replace(current, settled=current.settled | off)
+        given = current, looked, proposal.corrected, off, missed
+        found = iteration.find_aims(*given, late)
+        current, number = iteration.next_aim(current, found, missed), number + 1
     raise AssertionError("unreachable")
 
 
@@ -474,7 +477,7 @@ def _glimpse(current: SolverState, proposal: Proposal, found: Replanned) -> Snap
         reasons=decided.reasons,
         correction=decided.correction,
         aim=current.solved.direction,
-        bent=current.bent,
+        foretold=current.aside,
         left=np.column_stack([current.held, current.swung, current.settled]),
         q=found.exact.q,
         passed=found.passed,
@@ -498,7 +501,7 @@ def _read_back(
     setting = iteration.setting
     edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
     last = course.look(current, proposal)
-    flipped = current.find_flank_changes(proposal, last.side, OTHER)
+    flipped = current.find_off(proposal, last.side, late=True)
     if flipped.any():
         return None, flipped
     with setting.clock("solve"):

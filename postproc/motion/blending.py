@@ -16,7 +16,6 @@ from postproc.arrays import (
     floats,
 )
 from postproc.motion.joint_path import Trace
-from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.backlash_operator import Edges
@@ -129,6 +128,7 @@ class Corners:
         nearest: Where on the corner the TCP passes closest to the point, (c,) in s.
         q: Joint angles there, (c, 6) [rad].
         aside: From the point to there, (c, 3) [m].
+        along: Direction of the path there, (c, 3), of the length 1.
         bend: What the parabola bends by, half of its second derivative, (c, 6) [rad].
     """
 
@@ -136,6 +136,7 @@ class Corners:
     nearest: Floats
     q: Floats
     aside: Floats
+    along: Floats
     bend: Floats
 
     @property
@@ -157,11 +158,11 @@ def _pass_corners(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Co
     point = turned + flange[:, :3, 3]
     within = targets.rounding[found.visit] == Fly.WITHIN
     wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
-    before, behind, nearest, q, aside, bend = _native.passed(
+    before, behind, nearest, q, aside, along, bend = _native.passed(
         arm.dh.pack(), traced.edges, traced.q, found, floats(tool), point, wanted,
     )  # fmt: skip
     found = replace(found, before=before, behind=behind)
-    return Corners(found, nearest, q, aside, bend)
+    return Corners(found, nearest, q, aside, along, bend)
 
 
 # Paths whose fly points are rounded: new samples, and where each point is passed.
@@ -189,24 +190,12 @@ def blend(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trac
         return traced
     q, aside = np.array(traced.q), np.array(traced.aside)
     q[visit], aside[visit] = found.q, found.aside
+    rounded = np.zeros((len(q), 7))
+    parts = found.zones.before, found.zones.behind, found.nearest, ~found.flat
+    rounded[visit] = np.column_stack([*parts, found.along])
     coupling = None if timed else floats(arm.coupling)
     edges, share = _resample(traced, found, coupling)
-    pull = _pull(targets, traced, found)
-    return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
-
-
-def _pull(targets: Targets, traced: Trace, found: Corners) -> BlendCoupling:
-    """Tell how sharp corners move with the targets next to them.
-
-    On a flat one the corrections of neighbours are alike but where a joint turns, and
-    to sharpen that step would make the joint turn elsewhere.
-    """
-    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
-    zones, s = found.zones[~found.flat], found.nearest[~found.flat]
-    return BlendCoupling(
-        zones.visit, traced.edges.source[zones.into], to[zones.out],
-        zones.before * (1 - s) ** 2, zones.behind * s**2,
-    )  # fmt: skip
+    return replace(traced, q=q, aside=aside, rounded=rounded, edges=edges, share=share)
 
 
 def _resample(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from postproc.motion.branches import (
     unwrap_samples,
     wrist_interpolated,
 )
-from postproc.motion.path import BlendCoupling, Segments, arcs, lines, sample
+from postproc.motion.path import Segments, arcs, lines, sample
 from postproc.motion.targets import (
     AMBIGUOUS,
     ARC_END,
@@ -584,8 +584,8 @@ class Trace:
         overruled: Continuity took another branch or turn than the string says, (n,).
         aside: From the targets to where the path passes them, (n, 3) [m], NaN where not
             known.
+        rounded: Corners of the targets, (n, 7), see `BlendCoupling`.
         stops: As of the targets, (n,).
-        pull: How rounded fly points move with their neighbours.
     """
 
     q: Floats
@@ -598,8 +598,8 @@ class Trace:
     reason: Ints
     overruled: Bools
     aside: Floats
+    rounded: Floats
     stops: Bools
-    pull: BlendCoupling = field(default_factory=BlendCoupling)
 
     @property
     def driven(self) -> Edges:
@@ -805,7 +805,7 @@ def _finish(work: PathSolver) -> Trace:
     aside[is_unknown(work.flange) | is_unknown(t.tool)] = np.nan
     return Trace(
         work.q, work.flange, work.slot, edges, samples.length, samples.turning, share,
-        work.reason, np.asarray(written & other), aside, t.stops,
+        work.reason, np.asarray(written & other), aside, np.zeros((len(t), 7)), t.stops,
     )  # fmt: skip
 
 

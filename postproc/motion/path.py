@@ -499,7 +499,8 @@ def _place(part: Segments, u: float) -> Floats:
 #
 # The corner superposes two moves, so that the place where the path passes a point moves
 # by the share 1 - v - w of what the point moves, and by the shares v and w of what the
-# points before and behind it move; see `blending`. Exact for straight moves of the TCP.
+# points before and behind it move; see `blending`. Along the path it moves as the point
+# does, next to which it lies. Exact for straight moves of the TCP.
 
 ROUNDS = 12  # of Jacobi's method; v + w is 1/4 at most, each gains a factor of two
 
@@ -520,6 +521,7 @@ class BlendCoupling:
         visit: The point, (c,).
         before, behind: The targets next to it, (c,).
         v, w: Their shares, (c,).
+        along: Direction of the path at the point, (c, 3).
     """
 
     visit: Ints = field(default_factory=_no_points)
@@ -527,6 +529,33 @@ class BlendCoupling:
     behind: Ints = field(default_factory=_no_points)
     v: Floats = field(default_factory=_no_shares)
     w: Floats = field(default_factory=_no_shares)
+    along: Floats = field(default_factory=lambda: np.empty((0, 3)))
+
+    @classmethod
+    def of(cls, rounded: Floats, first: Ints, source: Ints) -> BlendCoupling:
+        """Tell how sharp corners move with the targets next to them.
+
+        On a flat one the corrections of neighbours are alike but where a joint turns,
+        and to sharpen that step would make the joint turn elsewhere.
+
+        Args:
+            rounded: The corners of n targets, (n, 7): the parts of the edges before and
+                behind that belong to each, where on it the path passes the target, in s
+                of `blending`, 1 where it is not flat, and the direction of the path
+                there; 0 without a corner.
+            first: Where the edges to every target begin, (n + 1,), as in `Edges`.
+            source: Where every edge begins, (e,), likewise.
+        """
+        to = np.repeat(np.arange(len(rounded)), np.diff(first))
+        behind = np.full(len(rounded), -1)
+        behind[source[source >= 0]] = to[source >= 0]
+        visit = np.flatnonzero(rounded[:, 3])
+        before, behind = source[first[visit]], behind[visit]
+        known = (before >= 0) & (behind >= 0)
+        visit, before, behind = visit[known], before[known], behind[known]
+        part, rest, s, _, *along = rounded[visit].T
+        shares = part * (1.0 - s) ** 2, rest * s**2
+        return cls(visit, before, behind, *shares, np.column_stack(along))
 
     def on(self, moved: Floats) -> Floats:
         """Tell how much farther than their targets points move, (n, 3).
@@ -537,6 +566,7 @@ class BlendCoupling:
         here = moved.take(self.visit, axis=0)
         pulled = self.v[:, None] * (moved.take(self.before, axis=0) - here)
         pulled += self.w[:, None] * (moved.take(self.behind, axis=0) - here)
+        pulled -= (pulled * self.along).sum(axis=1)[:, None] * self.along
         out = np.zeros_like(moved)
         out[self.visit] = pulled
         return out
@@ -544,4 +574,5 @@ class BlendCoupling:
     def to_move(self, wanted: Floats) -> Floats:
         """Move targets so that the path moves as wanted where it passes, (n, 3)."""
         corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
-        return _native.to_move(floats(wanted), corners, shares, ROUNDS)
+        along = floats(self.along)
+        return _native.to_move(floats(wanted), corners, shares, along, ROUNDS)

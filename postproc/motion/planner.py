@@ -113,13 +113,14 @@ def plan(
         from postproc.motion.timing import tell_time  # with what only timed runs load
 
         clock = tell_time(arm, targets, traced)
+    pull = BlendCoupling.of(traced.rounded, traced.edges.first, traced.edges.source)
     tool = targets.tool
     tcp = where_passed(arm, points_of_plan(exact), traced.q) @ tool
     return Plan(
         traced.q, tcp, traced.aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
-        traced.pull, arrived.past, exact,
+        pull, arrived.past, exact,
     )  # fmt: skip
 
 

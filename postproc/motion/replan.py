@@ -59,6 +59,7 @@ class Replanned:
         passed: Joint angles where the path, its corners rounded, passes them, (n, 6)
             [rad], NaN where not known.
         aside: From the targets to there, (n, 3) [m].
+        rounded: Their corners, (n, 7), see `BlendCoupling`.
         slot: Branch taken, (n,), -1 where it was not looked up.
         passages: What the rounded paths between do to the joints' play.
         sides: On which sides the joints arrive.
@@ -72,6 +73,7 @@ class Replanned:
     exact: PlannedPoints
     passed: Floats
     aside: Floats
+    rounded: Floats
     slot: Ints
     passages: Passages
     sides: FlankState
@@ -82,6 +84,13 @@ class Replanned:
     def side(self) -> Floats:
         """Return where every joint lies in its play, as in `Reached`."""
         return self.sides.side
+
+    @property
+    def places(self) -> Floats:
+        """Return where the targets are, (n, 3) [m], base frame."""
+        tool, flange = self.targets.tool[:, :3, 3], self.exact.flange
+        turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
+        return turned + flange[:, :3, 3]
 
     @property
     def exact_path(self) -> Trace:
@@ -115,8 +124,8 @@ def replan_all(
     found = sides(arm, traced.q, ways, lead)
     found = sides_on_curves(arm, targets, traced.q, found)
     return Replanned(
-        arm, targets, points_of_plan(exact), traced.q, traced.aside, exact.slot, ways,
-        found, begin, exact,
+        arm, targets, points_of_plan(exact), traced.q, traced.aside, traced.rounded,
+        exact.slot, ways, found, begin, exact,
     )  # fmt: skip
 
 
@@ -227,10 +236,12 @@ def replan(
     )
     now = passages(arm, traced.q, traced.driven)
     ways = _splice_edges(before.passages, part, now)
-    found = sides(arm, passed, ways, lead)
+    found = sides_on_curves(arm, targets, passed, sides(arm, passed, ways, lead))
+    aside = _patch_rows(before.aside, part, traced.aside)
+    corners = _patch_rows(before.rounded, part, traced.rounded)
     return Replanned(
-        arm, targets, at_targets, passed, _patch_rows(before.aside, part, traced.aside),
-        slot, ways, sides_on_curves(arm, targets, passed, found), before.begin,
+        arm, targets, at_targets, passed, aside, corners, slot, ways, found,
+        before.begin,
     )  # fmt: skip
 
 

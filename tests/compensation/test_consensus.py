@@ -24,7 +24,7 @@ def glimpse(n: int, off: float = 0.0) -> Snapshot:
     flags = np.zeros((n, 3), dtype=bool)
     return Snapshot(
         values=rows, status=one, why=one % 2, reasons=(NO_REASON, FAR), aim=rows,
-        correction=rows[:, :3], bent=rows[:, :3], left=flags, q=rows * np.nan,
+        correction=rows[:, :3], foretold=rows[:, :3], left=flags, q=rows * np.nan,
         passed=rows, aside=rows[:, :3], slot=one, side=rows, lo=rows, hi=rows,
     )  # fmt: skip
 

@@ -45,7 +45,8 @@ def test_targets_make_up_for_what_their_neighbours_pull() -> None:
     n = 40
     middle = np.arange(1, n - 1)
     v, w = rng.uniform(0, 0.125, (2, n - 2))
-    pull = BlendCoupling(middle, middle - 1, middle + 1, v, w)
+    along = np.eye(3)[rng.integers(0, 3, n - 2)]
+    pull = BlendCoupling(middle, middle - 1, middle + 1, v, w, along)
     wanted = rng.normal(size=(n, 3))
     moved = pull.to_move(wanted)
     np.testing.assert_allclose(moved + pull.on(moved), wanted, atol=2e-3)

@@ -42,6 +42,7 @@ def to_move(pull, wanted, rounds):
         for c, at in enumerate(pull.visit):
             aside = pull.v[c] * (before[pull.before[c]] - before[at])
             aside = aside + pull.w[c] * (before[pull.behind[c]] - before[at])
+            aside = aside - (aside @ pull.along[c]) * pull.along[c]
             moved[at] = wanted[at] - aside
     return moved
 
