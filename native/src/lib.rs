@@ -112,6 +112,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(spline::splines, module)?)?;
     module.add_function(wrap_pyfunction!(time_law::fastest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
+    module.add_function(wrap_pyfunction!(number::count_decimals, module)?)?;
     module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
     module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;
     module.add_function(wrap_pyfunction!(weave::cut, module)?)?;

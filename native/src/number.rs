@@ -249,6 +249,19 @@ fn put_searched(out: &mut Vec<u8>, value: f64) {
     write!(out, "{digits}e{sign}{:02}", exponent.abs()).expect("a vector takes all");
 }
 
+/// Count the decimals of numbers that stand at places of a text, (k,).
+#[pyfunction]
+pub fn count_decimals<'py>(
+    py: Python<'py>,
+    data: &Bound<'py, PyBytes>,
+    start: PyReadonlyArray1<'py, i64>,
+    end: PyReadonlyArray1<'py, i64>,
+) -> PyResult<Column<'py, i64>> {
+    let places = Places::new(data.as_bytes(), flat(&start)?, flat(&end)?)?;
+    let found = each(py, places.start.len(), |i| decimals_of(places.text(i)))?;
+    Ok(found.into_pyarray(py))
+}
+
 /// Write new values over numbers that stand at places of a text.
 ///
 /// A number changes where its value does by more than half of its last digit as it will be

@@ -43,7 +43,7 @@ from postproc.compensation.inverse_model import (
 )
 from postproc.compensation.options import Clock, Job
 from postproc.compensation.program import ParsedProgram, PlannedProgram
-from postproc.compensation.rewrite import read_back
+from postproc.compensation.rewrite import WrittenNumbers, read_back
 from postproc.compensation.targets import move_targets
 from postproc.language.text.number_edits import edits as number_edits
 from postproc.language.text.source import Replacements
@@ -123,6 +123,11 @@ class Iteration:
     def beforehand(self) -> Beforehand:
         """What holds in every round."""
         return Beforehand.of(self.reading.visits, self.planned, self.setting)
+
+    @cached_property
+    def numbers(self) -> WrittenNumbers:
+        """How numbers are written."""
+        return WrittenNumbers.of(self.reading)
 
     def first_aim(self) -> SolverState:
         """Correct for the sides that were planned, or are meant."""
@@ -459,6 +464,8 @@ class _Course:
     ) -> Replanned:
         """Find where a proposal leads; without a round: as it is written."""
         values = proposal.decisions.corrected
+        if turn is not None:
+            values = self.iteration.numbers.round(values)
         with self.iteration.setting.clock("plan again"):
             near, lead = 0.0 if turn is None else NEAR, self.lead.looks.sides_at(turn)
             found = self.replanner.after(values, lead, near)

@@ -17,7 +17,11 @@ from postproc.compensation.sidecar import FileRecord, Sidecar, block_checksums, 
 from postproc.compensation.workers import in_background
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of
-from postproc.language.text.number_edits import NO_STAMP, difference
+from postproc.language.text.number_edits import (
+    NO_STAMP,
+    count_decimals,
+    difference,
+)
 from postproc.language.text.source import (
     Edit,
     Replacements,
@@ -142,6 +146,46 @@ def record(
 
 
 # The numbers of a corrected program as they will be read from its text.
+
+
+MOST_DECIMALS = 15
+
+
+@dataclass(frozen=True)
+class WrittenNumbers:
+    """How the numbers of n visits are written.
+
+    Attributes:
+        visits: The visits that have numbers of their own, (k,).
+        old: These numbers, (k, w).
+        scale: What makes whole numbers of those that are written, (k, w).
+    """
+
+    visits: Ints
+    old: Floats
+    scale: Floats
+
+    @classmethod
+    def of(cls, reading: ParsedProgram) -> WrittenNumbers:
+        """Look at a program."""
+        visits = reading.visits
+        rows = np.flatnonzero(visits.target.literal >= 0)
+        literals = visits.literals, reading.sources, visits.target.literal[rows]
+        decimals = count_decimals(*literals, visits.dialect)
+        scale = 10.0 ** np.minimum(decimals, MOST_DECIMALS)
+        return cls(rows, visits.target.values[rows], scale)
+
+    def round(self, values: Floats) -> Floats:
+        """Round the numbers of all visits as they will be read, (n, w).
+
+        Where that is not sure to the last bit, `read_back` tells.
+        """
+        out, own = np.array(values), values[self.visits]
+        stays = np.abs(own - self.old) <= 0.5 / self.scale
+        out[self.visits] = np.where(
+            stays, self.old, np.rint(own * self.scale) / self.scale
+        )
+        return out
 
 
 def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Floats:

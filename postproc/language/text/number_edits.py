@@ -148,6 +148,29 @@ Texts = NDArray[np.bytes_]
 MOST_DIGITS = 1_000  # of a number that is written again
 
 
+def count_decimals(
+    literals: Literals, sources: Sequence[Source], rows: Ints, dialect: Dialect
+) -> Ints:
+    """Return how many decimals new numbers of some literals have, (r, w).
+
+    Args:
+        literals: Where the numbers stand.
+        sources: The files that `literals.file` means.
+        rows: The literals, (r,).
+        dialect: How many decimals they have at least.
+    """
+    joints = literals.joints[rows, None]
+    least = np.where(joints, dialect.joint_decimals, dialect.pose_decimals)
+    places, file = literals.places[rows], literals.file[rows, None]
+    for number, source in enumerate(sources):
+        mine = np.nonzero((places.start >= 0) & (file == number))
+        spans = (of[mine].astype(np.int64) for of in (places.start, places.end))
+        least[mine] = np.maximum(
+            least[mine], _native.count_decimals(source.data, *spans)
+        )
+    return least
+
+
 def edits(
     literals: Literals,
     sources: Sequence[Source],
