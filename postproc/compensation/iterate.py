@@ -522,8 +522,8 @@ def _read_back(
     with setting.clock("verify"):
         job, plan = iteration.setting, iteration.planned.plan
         arm, tool, offset = job.cell.arm, plan.tool[:, :3, 3], job.offset
-        old, new = plan.exact, last.exact_path
-        moved = path_departure(arm, last.targets.move, tool, old, new, offset)
+        move, q = last.targets.move, last.exact.q
+        moved = path_departure(arm, move, tool, plan.exact, q, last.follow, offset)
     return Converged(proposal, edits, last.reached, moved), flipped
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -123,7 +124,13 @@ class _Samples:
 
 
 def path_departure(
-    arm: Arm, move: Ints, tool: Floats, old: Trace, new: Trace, offset: Floats
+    arm: Arm,
+    move: Ints,
+    tool: Floats,
+    old: Trace,
+    q: Floats,
+    follow: Callable[[], Trace],
+    offset: Floats,
 ) -> JointDeviation:
     """Compare the joint paths of two programs that differ in their targets alone.
 
@@ -132,14 +139,20 @@ def path_departure(
         move: `Motion` of n moves, (n,).
         tool: TCP in the flange frame at each, (n, 3) [m].
         old: Where one leads.
-        new: Where the other does.
+        q: Joint angles at the targets of the other, (n, 6) [rad].
+        follow: Finds where it leads; asked where a way has places inside.
         offset: See `departure`.
 
     Returns:
         The largest on the ways to every target, itself included.
     """
-    at = departure(arm, old.q, new.q, tool, offset)
-    some = _samples(move, old, new)
+    at = departure(arm, old.q, q, tool, offset)
+    visit = np.repeat(np.arange(len(move)), np.diff(old.edges.first))
+    count = np.diff(old.edges.start)
+    count = np.where(move[visit] == Motion.JOINT, ON_JOINT_MOVES, count) - 1
+    if not ((count > 0) & (old.edges.source >= 0)).any():
+        return at
+    some = _samples(visit, count, old, follow())
     if len(some.visit) == 0:
         return at
     joints, branch = np.array(at.joints), np.array(at.branch)
@@ -154,13 +167,18 @@ def path_departure(
     return JointDeviation(joints, elbow, wrist_centre, tcp, branch)
 
 
-def _samples(move: Ints, old: Trace, new: Trace) -> _Samples:
-    """Find the places inside of the ways that both programs are known to go."""
-    visit = np.repeat(np.arange(len(move)), np.diff(old.edges.first))
+def _samples(visit: Ints, count: Ints, old: Trace, new: Trace) -> _Samples:
+    """Find the places inside of the ways that both programs are known to go.
+
+    Args:
+        visit: The target of every edge, (e,).
+        count: How many places are looked at on each, (e,).
+        old: One program.
+        new: The other.
+    """
     known = (old.edges.source >= 0) & (new.edges.source == old.edges.source)
     edge = np.flatnonzero(known)
-    count = np.diff(old.edges.start)[edge]
-    count = np.where(move[visit[edge]] == Motion.JOINT, ON_JOINT_MOVES, count) - 1
+    count = count[edge]
     of = np.repeat(edge, count)
     step = spans(np.ones(len(edge), dtype=np.int64), count)
     part = step / np.repeat(count + 1, count)

@@ -92,8 +92,7 @@ class Replanned:
         turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
         return turned + flange[:, :3, 3]
 
-    @property
-    def exact_path(self) -> Trace:
+    def follow(self) -> Trace:
         """Return the way as if the arm stopped at every target."""
         return self.traced or trace(self.arm, self.targets, self.begin.known)
 
