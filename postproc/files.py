@@ -10,6 +10,7 @@ import stat
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -223,6 +224,16 @@ def open_text(file: str | Path | bytes, name: str) -> Path | NamedText:
     return NamedText(name, file) if isinstance(file, bytes) else Path(file)
 
 
+def _ahead(pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """Make every piece while the one before is written."""
+    source = iter(pieces)
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(next, source, None)
+        while (piece := coming.result()) is not None:
+            coming = pool.submit(next, source, None)
+            yield piece
+
+
 class _Temporaries:
     """Files under temporary names, in the folders of the final ones."""
 
@@ -253,7 +264,7 @@ class _Temporaries:
         os.umask(mask)
         mode = place.stat().st_mode & 0o777 if place.exists() else 0o666 & ~mask
         with self.open(place) as out:
-            out.writelines([data] if isinstance(data, bytes) else data)
+            out.writelines([data] if isinstance(data, bytes) else _ahead(data))
             _sync(out)
             set_mode(out, mode)
 

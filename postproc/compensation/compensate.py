@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -59,6 +60,7 @@ from postproc.compensation.rewrite import (
 )
 from postproc.compensation.sidecar import Sidecar
 from postproc.compensation.targets import report_rounded_points, unknown_blends
+from postproc.compensation.workers import in_worker
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
@@ -226,8 +228,19 @@ def finish(
         from postproc.compensation.paths.insertion_loop import correct_paths
 
         draft = correct_paths(reading, kept, setting, write_and_verify)
-    else:
-        draft = _write(reading, kept, setting)
+        return _report(name, reading, draft, setting)
+    if setting.options.times(len(reading.visits)):
+        return _report(name, reading, _write_timed(reading, kept, setting), setting)
+    output = _write(reading, kept, setting)
+    draft = CompensatedProgram(reading, kept, output, None)
+    with _verify_beside(reading, kept, output, setting):
+        return _report(name, reading, draft, setting)
+
+
+def _report(
+    name: str, reading: ParsedProgram, draft: CompensatedProgram, setting: Job
+) -> Outcome:
+    """Say what came of a program, in the time that this stage is given."""
     release_memory(len(reading.visits))
     with setting.clock("report"):
         outcome = report(name, reading, draft, setting)
@@ -235,17 +248,15 @@ def finish(
     return outcome
 
 
-def _write(
+def _write_timed(
     reading: ParsedProgram, kept: WindowResult, setting: Job
 ) -> CompensatedProgram:
-    """Write a program without points, and run it in time where that is asked for."""
-    output, again = write_and_verify(reading, kept, setting)
-    in_time = None
-    if setting.options.times(len(reading.visits)):
-        from postproc.compensation.timing_comparison import run_in_time
+    """Write a program without points, and run it in time."""
+    from postproc.compensation.timing_comparison import run_in_time
 
-        with setting.clock("time"):
-            in_time = run_in_time(reading, again, kept.position, setting)
+    output, again = write_and_verify(reading, kept, setting)
+    with setting.clock("time"):
+        in_time = run_in_time(reading, again, kept.position, setting)
     return CompensatedProgram(reading, kept, output, in_time)
 
 
@@ -257,16 +268,61 @@ def write_and_verify(
     Raises:
         VerificationError: The output is not what was meant.
     """
-    clock = setting.clock
-    with clock("rewrite"):
+    output = _write(reading, kept, setting)
+    with setting.clock("verify"):
+        return output, _verify(reading, kept, output, setting)
+
+
+def _write(reading: ParsedProgram, kept: WindowResult, setting: Job) -> Output:
+    """Write the numbers."""
+    with setting.clock("rewrite"):
         output = write_edits(reading, kept.edits, setting.model.id)
         release_memory(len(reading.visits))
-    with clock("verify"):
-        again = read_program(output.files, setting.cell, reading.programs)
-        release_memory(len(reading.visits))
-        values = kept.decisions.corrected
-        check_output(reading, again, output, kept.edited, values)
-    return output, again
+    return output
+
+
+def _verify(
+    reading: ParsedProgram, kept: WindowResult, output: Output, setting: Job
+) -> ParsedProgram:
+    """Read what was written; return it.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+    again = read_program(output.files, setting.cell, reading.programs)
+    release_memory(len(reading.visits))
+    check_output(reading, again, output, kept.edited, kept.decisions.corrected)
+    return again
+
+
+LONG = 40_000  # visits that are verified in a process of their own
+
+
+@contextmanager
+def _verify_beside(
+    reading: ParsedProgram, kept: WindowResult, output: Output, setting: Job
+) -> Iterator[None]:
+    """Verify what was written beside other work, in another process where it is long.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+
+    def verify() -> Iterator[dict[str, float]]:
+        clock = Clock(no_progress)
+        with clock("verify"):
+            _verify(reading, kept, output, setting)
+        yield clock.stages
+
+    if setting.processes == 1 or len(reading.visits) < LONG:
+        for stages in verify():
+            setting.clock.add(stages)
+        yield
+        return
+    with in_worker(verify) as found:
+        yield
+        for stages in found:
+            setting.clock.add(stages)
 
 
 def report(

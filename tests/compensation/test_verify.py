@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from postproc import cli as command_line
+from postproc.compensation import compensate as compensation
 from postproc.compensation import rewrite
 from postproc.compensation.program import ParsedProgram, read_program
 from postproc.compensation.rewrite import (
@@ -118,6 +119,21 @@ def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> No
     assert "another byte differs" in told and "Traceback" not in told
     assert ("internal error" in told) == (error is ValueError)
     assert desk.names() == {"job.pdl"}
+
+
+def test_what_another_process_finds_wrong_ends_the_run(
+    job_cell: Cell, job_model, monkeypatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise VerificationError("job.pdl: another byte differs; nothing is written")
+
+    monkeypatch.setattr(compensation, "LONG", 1)
+    job = program(FIRST, POSE)
+    done = compensation.compensate(job, job_cell, job_model, processes=2)
+    assert "verify" in done.stages
+    monkeypatch.setattr(compensation, "check_output", fail)
+    with pytest.raises(VerificationError, match="another byte"):
+        compensation.compensate(job, job_cell, job_model, processes=2)
 
 
 def test_what_is_wrong_with_a_text_is_told_before_what_is_wrong_with_visits(
