@@ -7,7 +7,7 @@ import pytest
 
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.program import ParsedProgram, read_program
-from postproc.compensation.rewrite import read_back
+from postproc.compensation.rewrite import WrittenNumbers, read_back
 from postproc.robot.cell import Cell
 from tests.language.pdl2.reachable import reachable
 from tests.written import write_numbers
@@ -37,6 +37,22 @@ def test_they_are_those_of_the_output(job_cell: Cell, seed: int) -> None:
     np.testing.assert_array_equal(found[direct], again.target.values[direct])
     np.testing.assert_allclose(found, again.target.values, rtol=0, atol=1e-9)
     assert equivalent(reading.visits, again, rows, found) == ""
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_rounded_numbers_are_those_that_are_read(job_cell: Cell, seed: int) -> None:
+    text = reachable(seed, exact=seed % 2 == 0, pages=False).text
+    reading = read_program({"job.pdl": text.encode("latin-1")}, job_cell)
+    rows, values = changed(reading, seed)
+    own = reading.visits.target.literal
+    plain = (own >= 0) & (reading.visits.target.shift < 0)
+    new = np.array(reading.visits.target.values)
+    at = np.searchsorted(rows, own[mine := np.flatnonzero(plain & np.isin(own, rows))])
+    new[mine] = values[at]
+    output = write_numbers(reading, rows, values, "0" * 12)
+    found = read_back(reading.visits, rows, output.edits)
+    rounded = WrittenNumbers.of(reading).round(new)
+    np.testing.assert_array_equal(rounded[plain], found[plain])
 
 
 def test_another_number_is_refused(job_cell: Cell) -> None:
