@@ -27,7 +27,9 @@ const AGREES: f64 = 1e-3; // .. and need no other correction
 const GOES_ON: usize = 4; // looks along the answers, and as many from flanks
 const NEWTON: usize = 6; // looks along their derivatives
 const SWEEPS: i32 = 5; // the later ones know what becomes of the target behind
-const FAR: usize = 6; // visits from what is reached from other sides, or bent
+const LAST: i32 = 4; // sweeps that follow what has been settled
+const FAR: usize = 6; // visits from what is reached from other sides, or bent by much
+const LARGE: f64 = 5e-6; // [m] .. which is by more than this
 const NEAR: f64 = 4.0; // halves of a play's width: a joint that moves farther may well leap
 const LEAP: f64 = 0.5; // of a side, from visit to visit
 const LEAPT: f64 = 0.1; // what a leap counts against what is off, both of a side
@@ -91,6 +93,8 @@ struct Settling<'a> {
     reached: Vec<Six>,
     /// The sweep that has changed something of them last.
     changed: Vec<i32>,
+    /// What they are corrected for stays now.
+    holds: bool,
 }
 
 /// How the place of a command answers the sides that it is made for, a row for each side.
@@ -131,18 +135,25 @@ impl Settling<'_> {
             && self.source.iter().all(|visit| *visit < n as i64)
     }
 
-    /// Find what is needed of the visits that move, before they do.
+    /// Begin with bent corners; only what is near something that is off by much is free.
     fn prepare(&mut self) {
         let n = self.aims.len();
         self.bends.before = (0..n).map(|i| self.before(i)).collect();
         self.bends.begin();
-        let moves: Vec<bool> = (0..n).map(|i| self.off[i] || self.bent(i) != STAYS).collect();
-        let near = |i: usize| moves[i.saturating_sub(FAR)..n.min(i + FAR)].contains(&true);
+        let far: Vec<bool> = (0..n).map(|i| self.off[i] || self.is_bent(i, LARGE)).collect();
+        let near = |i: usize| far[i.saturating_sub(FAR)..n.min(i + FAR)].contains(&true);
         self.free = (0..n).map(|i| self.free[i] && near(i)).collect();
-        for i in (0..n).filter(|i| moves[*i]) {
-            self.bends.pass(i, self.bent(i));
-            self.changed[i] = -1;
+        for i in 0..n {
+            if self.off[i] || self.is_bent(i, 0.0) {
+                self.bends.pass(i, self.bent(i));
+                self.changed[i] = -1;
+            }
         }
+    }
+
+    /// Tell whether the path is to be bent at a visit, by more than something.
+    fn is_bent(&self, i: usize, most: f64) -> bool {
+        self.missed[i].iter().any(|by| by.abs() > most)
     }
 
     /// By what the path is to move for what it misses a visit by.
@@ -186,7 +197,7 @@ impl Settling<'_> {
         let stays = by == STAYS && self.bends.is_quiet(i);
         let look = self.look(i, stays);
         let now = self.arrived(&look, &by);
-        if !self.free[i] || !differs(&now.0, &last) {
+        if self.holds || !self.free[i] || !differs(&now.0, &last) {
             return self.pass(i, by, now, last);
         }
         if self.gains[i].is_none() {
@@ -512,12 +523,14 @@ pub fn next_aims<'py>(
         gains: vec![None; n],
         reached: rows::<6>(&ways.side)?.to_vec(),
         changed: vec![-2; n],
+        holds: false,
     };
     if !settling.is_sound() {
         return Err(PyIndexError::new_err("visits or edges that are not there"));
     }
     settling.prepare();
-    for round in 0..SWEEPS {
+    for round in 0..SWEEPS + LAST {
+        settling.holds = round >= SWEEPS;
         each(py, n, |i| settling.sweep(i, round))?;
     }
     let bends = &settling.bends;

@@ -33,6 +33,7 @@ LEAST = 1e-9  # standard deviation [m]
 FLAT = 1e-3  # .. and part of the mean: below it the error does not scatter
 MANY, FEW = 40_000, 4_000  # laws, and those that tell nearly what all of them do
 NEAR = 0.03  # of the length that these tell
+FINE = 1e-9  # [m] to which that length is found
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +229,7 @@ def pool_bound(law: LengthLaw, widest: float) -> float:
     if n > MANY:  # some of them tell nearly the same
         near = pool_bound(law[:: n // FEW], widest)
         least, widest = _widen(more, near, widest)
-    return widest if more(widest) >= 0.0 else float(brentq(more, least, widest))
+    return widest if more(widest) >= 0.0 else float(brentq(more, least, widest, xtol=FINE))
 
 
 def _widen(
