@@ -2,7 +2,8 @@
 //!
 //! A correction moves its target, and with it the place of every joint in its play there
 //! and behind. So sides are settled in the order of the program: at each target from what
-//! the ones before have become, to where aim and arrival are the same.
+//! the ones before have become, to where aim and arrival are the same. A rounded corner
+//! moves with the target behind it as well, so that this is done a few times.
 
 use std::cell::OnceCell;
 
@@ -84,7 +85,7 @@ struct Settling<'a> {
     /// What is known of the play at visits, as it was found and as it becomes.
     known: Vec<Clamp>,
     play: Vec<Clamp>,
-    /// What their angles change by, and those of targets whose corners are rounded.
+    /// What the path moves by at the visits, and what their targets move by for that.
     bends: Bends<'a>,
     /// How commands answer, of visits that may be corrected for other sides [m].
     gains: Vec<Option<Gain>>,

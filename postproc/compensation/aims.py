@@ -93,8 +93,9 @@ def next_aims(
     near there, the nearest miss is taken, not a leap that the next target would have to
     take back.
 
-    How far the ways between have moved is taken from both of their ends: what that
-    misses, a further look at the program finds.
+    Corners are rounded anew as their targets move, so that a joint that turns back on
+    one is found where it will. Of curved ways and of moves of joints only both ends
+    count: what that misses, a further look at the program finds.
 
     Args:
         model: The arm's error.

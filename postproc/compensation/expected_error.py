@@ -229,7 +229,9 @@ def pool_bound(law: LengthLaw, widest: float) -> float:
     if n > MANY:  # some of them tell nearly the same
         near = pool_bound(law[:: n // FEW], widest)
         least, widest = _widen(more, near, widest)
-    return widest if more(widest) >= 0.0 else float(brentq(more, least, widest, xtol=FINE))
+    if more(widest) >= 0.0:
+        return widest
+    return float(brentq(more, least, widest, xtol=FINE))
 
 
 def _widen(
