@@ -10,7 +10,7 @@ from typing import Any, ClassVar, cast
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Place
-from postproc.language.analysis.declarations import Datum, TaskFile
+from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.language import Cloner, NamedPoint
 from postproc.language.text.source import (
@@ -64,11 +64,8 @@ class TaskCloner(Cloner):
     quiet: ClassVar[re.Pattern[str]]
 
     def __post_init__(self) -> None:
-        """Take the words of the files."""
-        self.take_words(self.task.files)
-
-    def take_words(self, files: Sequence[TaskFile]) -> None:
-        """Give no clone a name that stands in some files."""
+        """Take the words of the files: data of one name may be shared by all."""
+        files = (*self.task.files, *self.task.files_beside)
         texts = (file.text.source.data for file in files)
         words = (word for text in texts for word in self.word.findall(text))
         self.taken |= {word.decode("latin-1").lower() for word in words}

@@ -52,6 +52,7 @@ class TaskSymbols(ABC, Generic[F]):
     Attributes:
         files: Its files, the one that runs first.
         taught: Lower-case names of data that were taught with the arm, by the cell.
+        files_beside: Files of tasks that run at the same time.
         comments: How the language writes them.
         layouts: Components of data by type.
         followed: Types of data whose assignments are followed.
@@ -66,6 +67,7 @@ class TaskSymbols(ABC, Generic[F]):
 
     files: Sequence[F]
     taught: Collection[str] = frozenset()
+    files_beside: Sequence[F] = ()
     comments: ClassVar[Comments]
     layouts: ClassVar[Mapping[str, Layout]]
     followed: ClassVar[Collection[str]]

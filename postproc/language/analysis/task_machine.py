@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -121,7 +121,6 @@ class TaskMachine(Interpreter[Arrived]):
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
         task: What its names mean.
-        texts: The statements of its files, the main one first.
         start: What the cell says.
         visits: Arrivals by number.
         keys: Context, row and number within the row of each.
@@ -138,8 +137,7 @@ class TaskMachine(Interpreter[Arrived]):
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     task: TaskSymbols[Any] = field(kw_only=True)
-    texts: Sequence[StatementText[Any]]
-    start: Start
+    start: Start = field(kw_only=True)
     visits: list[Any] = field(default_factory=list)
     keys: list[tuple[Context, int, int]] = field(default_factory=list)
     diagnostics: set[Diagnostic] = field(default_factory=set)
@@ -160,6 +158,11 @@ class TaskMachine(Interpreter[Arrived]):
 
     def __post_init__(self) -> None:
         self.reached = [np.zeros(len(text), dtype=bool) for text in self.texts]
+
+    @cached_property
+    def texts(self) -> Sequence[StatementText[Any]]:
+        """The statements of all files, the main one first."""
+        return [file.text for file in (*self.task.files, *self.task.files_beside)]
 
     # What a language says.
 
@@ -736,25 +739,24 @@ def scope_at(at: At, here: Arrived | None = None) -> Scope:
     return scope
 
 
-def follow(make: Callable[[], M]) -> M:
+def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
     """Make a machine and run it.
 
     It runs again where data turn out to change in ways that are not followed.
     Where anything runs beside the program another one reads each move by itself: what
     runs beside may be one of several that were read at once.
     """
-    machine = make()
-    machine.task.volatile = machine.list_changed_beside()
+    machine = kind(task=task, start=start)
+    task.volatile = machine.list_changed_beside()
     machine.run()
     while True:
-        task, changed = machine.task, machine.list_changed_beside()
+        changed = machine.list_changed_beside()
         runs = bool(machine.beside) and any(v.count > 1 for v in machine.visits)
         if changed <= task.volatile and not runs:
             break
         task.volatile |= changed
         at_once = machine.at_once and not machine.beside
-        machine = make()
-        machine.at_once = at_once
+        machine = kind(task=task, start=start, at_once=at_once)
         machine.run()
     machine.settle_points()
     return machine

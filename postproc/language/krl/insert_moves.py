@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,7 +36,7 @@ class KrlSplitter(insert_moves.Splitter):
         files: The files.
     """
 
-    files: tuple[KrlFile, ...]
+    files: Sequence[KrlFile]
     unsized: str = (
         "points on its way would be passed at a distance that is not known: set "
         "$APO.CDIS before it"

@@ -44,7 +44,6 @@ from postproc.language.krl.symbols import (
     package_routines,
     values_of,
 )
-from postproc.language.language import Start
 from postproc.language.visits import START
 
 _INTERRUPT = Reason(
@@ -87,7 +86,6 @@ class KrlMachine(TaskMachine):
 
     Attributes:
         task: Its files.
-        goals: Reads destinations.
     """
 
     procedures = ("def",)
@@ -100,18 +98,15 @@ class KrlMachine(TaskMachine):
         said.InterruptDeclared,
     )  # fmt: skip
     task: KrlTask = field(kw_only=True)
-    goals: KrlGoals = field(kw_only=True)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
     _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
 
-    @classmethod
-    def of(cls, task: KrlTask, start: Start) -> KrlMachine:
-        """Get ready to follow a job."""
-        texts = [file.text for file in task.files]
-        goals = KrlGoals(task, frozenset(start.aux))
-        return cls(texts, start, task=task, goals=goals)
+    @cached_property
+    def goals(self) -> KrlGoals:
+        """What reads destinations."""
+        return KrlGoals(self.task, frozenset(self.start.aux))
 
     def run(self) -> None:
         """Follow every way from the first routine."""

@@ -11,7 +11,6 @@ from postproc.language import ir
 from postproc.language.insert_moves import MoveLayout, Splitter, spell, split_arguments
 from postproc.language.rapid.clones import ends_line
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
-from postproc.language.rapid.program import RapidFile
 from postproc.language.rapid.symbols import RapidTask
 from postproc.language.text.source import CloneError, Span
 
@@ -38,11 +37,9 @@ class RapidSplitter(Splitter):
 
     Attributes:
         task: Its modules.
-        beside: Files of other tasks.
     """
 
     task: RapidTask
-    beside: tuple[RapidFile, ...] = ()
 
     def hinders(self, file: int, line: int) -> str:
         """Say why a move must stay in one piece, see `Splitter.hinders`."""
@@ -71,14 +68,14 @@ class RapidSplitter(Splitter):
     @cached_property
     def _readers(self) -> str:
         """Say what may read where the arm is on its way, "" for nothing."""
-        files = (*self.task.files, *self.beside)
+        files = (*self.task.files, *self.task.files_beside)
         traps = any(
             getattr(routine.head, "kind", "") == "trap"
             for file in self.task.files
             for routine in file.routines
         )
         reads = any(_READS.search(file.text.source.data) for file in files)
-        if reads and (traps or self.beside):
+        if reads and (traps or self.task.files_beside):
             return "a TRAP or another task may read where the arm is on its way"
         return ""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
@@ -21,7 +21,6 @@ from postproc.language.analysis.task_machine import (
     TaskMachine,
     scope_at,
 )
-from postproc.language.language import Start
 from postproc.language.rapid import errors
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
@@ -47,7 +46,7 @@ from postproc.language.rapid.moves import (
     own_numbers,
     pose_of,
 )
-from postproc.language.rapid.program import RapidFile, inside, is_move
+from postproc.language.rapid.program import inside, is_move
 from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
 from postproc.language.visits import START
 
@@ -66,7 +65,6 @@ class RapidMachine(TaskMachine):
 
     Attributes:
         task: Its modules.
-        goals: Reads destinations, tools, work objects and zones.
         ends: What holds where the main routine ends.
         restarts: What holds where a cycle ends before that.
     """
@@ -75,25 +73,15 @@ class RapidMachine(TaskMachine):
     acting = (ir.Instruction,)
     passed = _PLAIN
     task: RapidTask = field(kw_only=True)
-    goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], errors.ErrorHandlers] = field(default_factory=dict)
     _exits: dict[Context, tuple[errors.ErrorExit, ...]] = field(default_factory=dict)
 
-    @classmethod
-    def of(
-        cls, task: RapidTask, start: Start, beside: Sequence[RapidFile] = ()
-    ) -> RapidMachine:
-        """Get ready to follow a task.
-
-        Args:
-            task: The task.
-            start: What the cell says.
-            beside: Files of other tasks.
-        """
-        texts = [file.text for file in (*task.files, *beside)]
-        return cls(texts, start, task=task, goals=Goals(task))
+    @cached_property
+    def goals(self) -> Goals:
+        """What reads destinations, tools, work objects and zones."""
+        return Goals(self.task)
 
     def run(self) -> None:
         """Follow every way from the main routine."""
