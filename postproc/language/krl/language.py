@@ -80,7 +80,7 @@ class Krl(TaskLanguage):
         """Parse the files of a job to put points on the ways of its moves."""
         from postproc.language.krl.insert_moves import KrlSplitter
 
-        return KrlSplitter(self.parse(sources, language.Start()).files)
+        return KrlSplitter(self.parse(sources, language.Start()))
 
     def reads(
         self,

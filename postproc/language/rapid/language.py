@@ -63,9 +63,7 @@ class Rapid(TaskLanguage):
         """Parse the modules of a task to put points on the ways of its moves."""
         from postproc.language.rapid.insert_moves import RapidSplitter
 
-        task = self.parse(sources, language.Start())
-        assert isinstance(task, RapidTask)
-        return RapidSplitter(task)
+        return RapidSplitter(self.parse(sources, language.Start()))
 
     def reads(
         self,
