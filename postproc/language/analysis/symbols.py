@@ -172,6 +172,10 @@ class TaskSymbols(ABC, Generic[F]):
         """Evaluate a value that only this language has, None where it is not known."""
         return None
 
+    def values_of(self, one: ir.SourceStatement) -> list[ir.Node]:
+        """List the values that a statement takes when it runs, with all in them."""
+        return ir.walk(one)
+
     def note_in(self, uses: NamesUsed, file: F, one: ir.SourceStatement) -> None:
         """Note what a statement of a file changes and takes."""
         uses.note(one)
@@ -296,14 +300,15 @@ class TaskSymbols(ABC, Generic[F]):
         return uses
 
     def _list_live(self, number: int) -> Iterable[ir.SourceStatement]:
-        """Return what the statements of a file say, but for routines that are dead."""
-        text, live = self.files[number].text, None
+        """Return what the statements of a file say, but for routines that are dead.
+
+        Those are left out that declare what is written in numbers alone.
+        """
+        text = self.files[number].text
+        live = text.which(_names_data)
         for routine in self.routines_by_file[number] if self.dead else ():
             if routine.key in self.dead:
-                live = np.ones(len(text), bool) if live is None else live
                 live[routine.inside.start : routine.inside.stop] = False
-        if live is None:
-            return text.said
         return [text.said[k] for k in np.unique(text.shape[live]).tolist()]
 
     @cached_property
@@ -344,7 +349,7 @@ class TaskSymbols(ABC, Generic[F]):
     def words_of_odd(self, but: Collection[str] = ()) -> frozenset[str]:
         """Return words of what is not understood, and does not begin with some."""
         texts = (file.text for file in self.files if not file.is_submit)
-        found = (one.words(one.where(holds_odd), but) for one in texts)
+        found = (one.words(one.of_kind(holds_odd), but) for one in texts)
         return frozenset().union(*found)
 
     def list_changes(self, one: ir.SourceStatement) -> Sequence[ir.DataObject]:
@@ -825,6 +830,12 @@ def whole(value: float) -> int | None:
     (3, None, None)
     """
     return int(value) if abs(value) < LARGEST and value == int(value) else None
+
+
+def _names_data(one: ir.SourceStatement) -> bool:
+    """Return True unless a statement declares data whose values name none."""
+    values = ir.walk(one) if isinstance(one, ir.Declaration) else [ir.DataObject("")]
+    return any(isinstance(part, ir.DataObject | ir.FunctionCall) for part in values)
 
 
 def holds_odd(one: ir.SourceStatement) -> bool:

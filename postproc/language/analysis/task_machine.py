@@ -155,6 +155,9 @@ class TaskMachine(Interpreter[Arrived]):
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
+        default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         self.reached = [np.zeros(len(text), dtype=bool) for text in self.texts]
@@ -223,6 +226,17 @@ class TaskMachine(Interpreter[Arrived]):
     def inside(self, one: ir.SourceStatement) -> ir.SourceStatement:
         """Return what a statement does: what stands behind its condition, or itself."""
         return one
+
+    def is_asked(self, part: ir.Node) -> bool:
+        """Return True if it counts that a statement asks for something as it runs."""
+        return isinstance(part, ir.FunctionCall)
+
+    def list_asked(self, one: ir.SourceStatement) -> Sequence[Any]:
+        """List what a statement asks for as it runs, of what counts."""
+        if id(one) not in self._asked:
+            found = tuple(filter(self.is_asked, self.task.values_of(one)))
+            self._asked[id(one)] = one, found
+        return self._asked[id(one)][1]
 
     def part_otherwise(
         self, at: At, one: ir.SourceStatement, here: Arrived
@@ -298,19 +312,28 @@ class TaskMachine(Interpreter[Arrived]):
     def act(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived | None:
         """Carry out a statement that leads to the next one."""
         if isinstance(one, self.acting):
-            return self.carry_out(at, one, state)
+            after = self.carry_out(at, one, state)
+            return None if after is None or self._went_on(at, after) else after
         state = self.after_functions(at, one, state)
         if type(one) in _PLAIN or isinstance(one, self.passed):
             return self.assign_point(at, one, state)
         return self.part_otherwise(at, one, state)
 
-    def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived] | None:
+    def _went_on(self, at: At, here: Arrived) -> bool:
+        """Tell whether the program has gone on like this behind a move before."""
+        numbers = self._numbers.get(at, ())
+        if not numbers:
+            return False
+        visit, before = self.visits[numbers[-1]], self.visits[numbers[-1]].left
+        visit.left = here.modes, here.points, here.origins.difference(numbers)
+        return bool(visit.left == before)
+
+    def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived | None] | None:
         """Run moves that follow each other; the visit of the first stands for all."""
         behind = self._runs_of(at.context).get(at.row)
         if behind is None:
             return None
         after = self.act(at, at.statement, state)
-        assert after is not None
         (number,) = self._numbers[at]
         self.visits[number].count = behind - at.row
         self.reached[at.place.scope.file][at.row : behind] = True
@@ -537,7 +560,7 @@ class TaskMachine(Interpreter[Arrived]):
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
         self.visits[known[0]].origins |= here.origins
-        return replace(here, origins=frozenset([known[-1]]))
+        return Arrived(frozenset([known[-1]]), here.modes, here.points)
 
     def _take_again(
         self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]

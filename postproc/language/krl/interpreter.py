@@ -42,7 +42,6 @@ from postproc.language.krl.symbols import (
     KrlTask,
     list_calls,
     package_routines,
-    values_of,
 )
 from postproc.language.visits import START
 
@@ -230,6 +229,8 @@ class KrlMachine(TaskMachine):
         """Forget what a routine may change of what is handed over to it."""
         if isinstance(one, said.InterruptDeclared | said.PathTrigger):
             return here
+        if isinstance(one, said.KrlMove) and not self.list_asked(one):
+            return here
         own = one.target if isinstance(one, ir.Assignment) else None
         modes = here.modes
         for target in self.task.list_changes(one):
@@ -296,16 +297,21 @@ class KrlMachine(TaskMachine):
         self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
-        for part in values_of(one):
+        for part in self.list_asked(one):
             if isinstance(part, ir.FunctionCall):
                 here = self._function(at, part.name, here)
-            elif isinstance(part, ir.DataObject) and part.name.startswith("$"):
+            else:
                 given = isinstance(one, ir.Assignment) and part is one.target
                 known = part.name in PLANNED or isinstance(one, said.KrlMove)
                 if given or (known and part.name not in HALTING):
                     continue
                 here = _halt(here, True if part.name in HALTING else None)
         return here
+
+    def is_asked(self, part: ir.Node) -> bool:
+        """Return True for functions and system variables."""
+        system = isinstance(part, ir.DataObject) and part.name.startswith("$")
+        return system or super().is_asked(part)
 
     def _function(self, at: At, name: str, here: Arrived) -> Arrived:
         """Allow for what a function does."""
@@ -534,7 +540,9 @@ class KrlMachine(TaskMachine):
     def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield functions and the instruction; of a trigger what it does."""
         parts = (
-            ir.walk(one.action) if isinstance(one, said.PathTrigger) else values_of(one)
+            ir.walk(one.action)
+            if isinstance(one, said.PathTrigger)
+            else self.task.values_of(one)
         )
         calls = ir.Instruction | ir.FunctionCall
         yield from (part.name for part in parts if isinstance(part, calls))

@@ -191,11 +191,9 @@ class KrlTask(TaskSymbols[KrlFile]):
     def counted(self) -> Counter[str]:
         """Names of the variables of loops, and how many loops count each."""
         found = Counter[str]()
-        for file in self.files:
-            rows = np.bincount(file.text.shape, minlength=len(file.text.said.shapes))
-            for one, count in zip(file.text.said, rows.tolist(), strict=False):
-                if isinstance(one, ir.ForLoop):
-                    found[one.name] += count
+        for text in (file.text for file in self.files):
+            rows = text.of_kind(lambda one: isinstance(one, ir.ForLoop))
+            found.update(text.statement(row).name for row in rows)
         return found
 
     @cached_property
@@ -206,7 +204,7 @@ class KrlTask(TaskSymbols[KrlFile]):
         """
         found = set[str]()
         for file in (f for f in self.files if not f.is_submit):
-            words = file.text.words(file.text.where(holds_odd), MOVE_WORDS)
+            words = file.text.words(file.text.of_kind(holds_odd), MOVE_WORDS)
             found |= words if file.routines else words.difference(TABLES)
         return frozenset(found)
 
@@ -301,6 +299,21 @@ class KrlTask(TaskSymbols[KrlFile]):
         written = (handed | uses.written | uses.changed | odd).difference(own)
         return _Beside(frozenset(written), frozenset(uses.read.difference(own)), called)
 
+    def values_of(self, one: ir.SourceStatement) -> list[ir.Node]:
+        """List the values that a statement takes when it runs, with all in them.
+
+        An interrupt or a trigger takes them at another time.
+        """
+        match one:
+            case said.InterruptDeclared() | said.InterruptSwitched():
+                return []
+            case said.PathTrigger(values=values):
+                return ir.walk(*values)
+            case said.KrlMove(settings=settings) | said.SplineBlock(settings=settings):
+                own = (x for x in one.children() if isinstance(x, ir.Operand))
+                return ir.walk(*own, *(setting.value for setting in settings))
+        return ir.walk(one)
+
     def note_in(self, uses: NamesUsed, file: KrlFile, one: ir.SourceStatement) -> None:
         """Note a statement; what a data list assigns is the first value of data."""
         if file.routines or not isinstance(one, ir.Assignment):
@@ -320,8 +333,11 @@ class KrlTask(TaskSymbols[KrlFile]):
     def _callers(self) -> Mapping[str, set[int]]:
         """Files by the names of routines that their statements call."""
         found = defaultdict[str, set[int]](set)
-        for number, file in enumerate(self.files):
-            for name in set[str]().union(*map(list_calls, file.text.said)):
+        for number, text in enumerate(file.text for file in self.files):
+            rows = text.of_kind(lambda one: bool(list_calls(one)))
+            for name in set[str]().union(
+                *(list_calls(text.statement(k)) for k in rows)
+            ):
                 found[name].add(number)
         return found
 
@@ -348,7 +364,9 @@ class KrlTask(TaskSymbols[KrlFile]):
                 return name
             case said.KrlAggregate(fields=fields):
                 times = Counter(f.name for f in fields)
-                once = [f for f in fields if times[f.name] == 1]
+                once = fields
+                if len(times) < len(fields):
+                    once = tuple(f for f in fields if times[f.name] == 1)
                 pairs = [(f.name, self.value(f.value, here, depth)) for f in once]
                 known = tuple((name, one) for name, one in pairs if one is not None)
                 return KnownRecord(known, len(known) == len(fields))
@@ -450,19 +468,3 @@ def _is_of_part(target: ir.DataObject) -> bool:
 def is_word(operand: ir.Operand | None, word: str) -> bool:
     """Return True if an operand is a word such as TRUE."""
     return operand == ir.DataObject(word)
-
-
-def values_of(one: ir.SourceStatement) -> list[ir.Node]:
-    """List the values that a statement takes when it runs, with all in them.
-
-    An interrupt or a trigger takes them at another time.
-    """
-    match one:
-        case said.InterruptDeclared() | said.InterruptSwitched():
-            return []
-        case said.PathTrigger(values=values):
-            return ir.walk(*values)
-        case said.KrlMove(settings=settings) | said.SplineBlock(settings=settings):
-            own = (x for x in one.children() if isinstance(x, ir.Operand))
-            return ir.walk(*own, *(setting.value for setting in settings))
-    return ir.walk(one)

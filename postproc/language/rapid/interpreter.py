@@ -47,7 +47,7 @@ from postproc.language.rapid.moves import (
     pose_of,
 )
 from postproc.language.rapid.program import inside, is_move
-from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
+from postproc.language.rapid.symbols import RapidTask, as_assignment
 from postproc.language.visits import START
 
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
@@ -404,7 +404,8 @@ class RapidMachine(TaskMachine):
         scope, found = self.task.scope_of(routine), set[tuple[str, Any]]()
         for row in routine.inside:
             one = self.texts[routine.file].statement(row)
-            effects, called = self.read_calls(functions_in(one), scope)
+            names = (call.name for call in self.list_asked(one))
+            effects, called = self.read_calls(names, scope)
             if effects.union(*map(self.routine_effects, called)):
                 return None
             one = inside(one)
@@ -424,7 +425,7 @@ class RapidMachine(TaskMachine):
         self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do, and for its errors."""
-        for name in functions_in(one):
+        for name in (call.name for call in self.list_asked(one)):
             if name in WAITING and name not in self.task.routines:
                 self.pause(here)
             still = name in STILL_FUNCTIONS or self.declares_motionless(name)
@@ -441,7 +442,7 @@ class RapidMachine(TaskMachine):
 
     def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield functions, the instruction, and what a move calls by a text."""
-        yield from functions_in(one)
+        yield from (call.name for call in self.list_asked(one))
         one = inside(one)
         if isinstance(one, ir.Instruction):
             yield one.name

@@ -153,7 +153,7 @@ class RapidTask(TaskSymbols[RapidFile]):
         key = file, datum.row
         if key not in self._moved:
             self._moved[key] = _is_shared(datum)  # while it is worked out
-            own = self._first_value(file, datum)
+            own = self._first_value(file, datum) if self._moved[key] else None
             self._moved[key] = _is_shared(datum) and any(
                 other.may_set(datum.name, own) for other in self.others
             )

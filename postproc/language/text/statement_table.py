@@ -61,6 +61,11 @@ class Statements(Generic[T]):
         found: Bools = self.said.which(test)[self.shape]
         return found
 
+    def of_kind(self, test: Callable[[T], bool]) -> list[int]:
+        """List statements that pass a test that no name in them decides."""
+        rows: list[int] = np.flatnonzero(self.which(test)).tolist()
+        return rows
+
     def find_rows(
         self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
     ) -> Indices:
