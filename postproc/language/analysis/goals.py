@@ -191,7 +191,9 @@ class GoalReader(ABC):
         if goal is None:
             why = self.explain_unknown(name) if name else AT_RUN_TIME
             return self.unknown(why, name)
-        if goal.target == Meaning.UNKNOWN or not (name or goal.slots[0] >= 0):
+        if goal.target == Meaning.UNKNOWN:
+            return replace(goal, name=name)
+        if not (name or goal.slots[0] >= 0):
             return goal
         if goal.file >= 0 and not self._is_own(goal, operand):
             goal = replace(goal, file=-1, slots=(-1,) * len(goal.slots))

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.call_context import CALLED, At, Context
@@ -94,9 +94,26 @@ class Arrived:
         """Forget where the arm is, what moves are made with, and all shared data."""
         return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
 
+    def elsewhere(self) -> Arrived:
+        """Forget where the arm is."""
+        return Arrived(NOWHERE, self.modes, self.points)
+
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
         return self if points is self.points else replace(self, points=points)
+
+    def with_modes(self, modes: Any) -> Arrived:
+        """Return it where moves are made otherwise."""
+        same = modes is self.modes
+        return self if same else Arrived(self.origins, modes, self.points)
+
+    def setting(self, **changed: Any) -> Arrived:
+        """Return it where some modes have other values."""
+        return self.with_modes(self.modes.with_(**changed))
+
+    def blocking(self, why: Reason) -> Arrived:
+        """Return it where targets cannot be compensated from here on, and why."""
+        return self.setting(blocked=self.modes.blocked | {why})
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -414,7 +431,7 @@ class TaskMachine(Interpreter[Arrived]):
         if said_of_it in ("moves", "sets-frames"):
             self.lost |= here.origins
         if said_of_it == "moves":
-            return replace(here, origins=NOWHERE)
+            return here.elsewhere()
         if said_of_it == "sets-frames":
             return here.forget()
         what = (

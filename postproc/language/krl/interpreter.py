@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -17,7 +17,6 @@ from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
     MOVES,
-    NOWHERE,
     Arrived,
     Effects,
     TaskMachine,
@@ -190,7 +189,7 @@ class KrlMachine(TaskMachine):
         """
         if not here.modes.perhaps:
             return self._run_once(at, one, here)
-        here = replace(here, modes=here.modes.with_(perhaps=False))
+        here = here.setting(perhaps=False)
         after = self._run_once(at, one, here)
         if after is None:
             self.go_on(at.behind, here)
@@ -205,9 +204,8 @@ class KrlMachine(TaskMachine):
         here = self._forget(at, one, here)
         match one:
             case said.KrlMove():
-                here = self.arrive(at, one, here)
-                modes = replace(here.modes, halted=False, goes_on=False)
-                return replace(here, modes=modes)
+                after = self.arrive(at, one, here)
+                return after.setting(halted=False, goes_on=False)
             case ir.Assignment():
                 return self._assign(at, one, here)
             case ir.Instruction():
@@ -215,7 +213,7 @@ class KrlMachine(TaskMachine):
             case said.Waiting():
                 return _halt(here, True)
             case said.ContinueWord():
-                return replace(here, modes=replace(here.modes, goes_on=True))
+                return here.setting(goes_on=True)
             case said.InterruptDeclared():
                 return self._declare(at, one, here)
             case said.InterruptSwitched():
@@ -241,7 +239,7 @@ class KrlMachine(TaskMachine):
                 what = f"hands {name.upper()} over, which may be changed"
                 return self.unknown(at, here, what)
             modes = modes.drop(name)
-        return here if modes is here.modes else replace(here, modes=modes)
+        return here.with_modes(modes)
 
     def _modes(self, at: At) -> ModeReader:
         return ModeReader(self.task, scope_at(at))
@@ -261,9 +259,8 @@ class KrlMachine(TaskMachine):
         value = one.value
         if isinstance(value, ir.FunctionCall) and value.name in ("eb", "eb_abs"):
             # The base follows a conveyor, which takes the arm along.
-            here = replace(here, origins=NOWHERE)
-        here = self.assign_point(at, one, here)
-        return replace(here, modes=modes)
+            here = here.elsewhere()
+        return self.assign_point(at, one, here).with_modes(modes)
 
     def _call(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived | None:
         name = one.name
@@ -273,12 +270,11 @@ class KrlMachine(TaskMachine):
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
                 here = _halt(here, None)  # outputs are switched, which may stop the arm
-            modes = self._modes(at).bas(here.modes, one.arguments)
-            return replace(here, modes=modes)
+            return here.with_modes(self._modes(at).bas(here.modes, one.arguments))
         if name == "pulse":
             return _halt(here, True)
         if name == "on_error_proceed":
-            return replace(here, modes=here.modes.with_(perhaps=True))
+            return here.setting(perhaps=True)
         if name in STILL or self.declares_motionless(name):
             return _halt(here, None)
         if name in package_routines() and not self._is_overruled(name):
@@ -327,21 +323,20 @@ class KrlMachine(TaskMachine):
         self._met.add((at.place.scope.file, at.row))
         effects = self.effects_of(one.action, at.place.scope)
         self._call_beside(one.action)
-        modes, number = here.modes, self._number_of(scope_at(at), one.number)
-        others = frozenset(d for d in modes.declared if d[0] != number)
-        modes = replace(modes, declared=others)
-        ends = RESUMES in effects
+        number = self._number_of(scope_at(at), one.number)
+        others = frozenset(d for d in here.modes.declared if d[0] != number)
+        here, ends = here.setting(declared=others), RESUMES in effects
         if ends and (MOVES in effects or not self._ends_routines(number)):
             self._begin_early(_RESUMED, here)
-            return replace(here, modes=modes.with_(blocked=modes.blocked | {_RESUMED}))
+            return here.blocking(_RESUMED)
         if effects:
             moves = _INTERRUPT if MOVES in effects else _RESUMED
             own = number, _ENDED if ends else moves
-            modes = replace(modes, declared=others | {own})
+            here = here.setting(declared=others | {own})
             if not self._find_routines(("on",), {number, EVERY}):  # nothing does
                 self._begin_early(own[1], here)
-                modes = replace(modes, active=modes.active | {own})
-        return replace(here, modes=modes)
+                here = here.setting(active=here.modes.active | {own})
+        return here
 
     # RESUME ends all routines that have been called where its interrupt is declared,
     # and the program goes on behind the call, wherever the arm is.
@@ -395,7 +390,7 @@ class KrlMachine(TaskMachine):
         ended = here.forget()
         on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
-        return here.join(replace(ended, modes=ended.modes.with_(active=left)))
+        return here.join(ended.setting(active=left))
 
     @cached_property
     def _still_enabled(self) -> set[int]:
@@ -429,13 +424,13 @@ class KrlMachine(TaskMachine):
             }
             for _, why in meant:
                 self._begin_early(why, here)
-            return replace(here, modes=replace(modes, active=modes.active | meant))
+            return here.setting(active=modes.active | meant)
         if one.word != "off" or (one.number is not None and number == EVERY):
             return here
         left = {d for d in modes.active if one.number is not None and d[0] != number}
         if left == modes.active:
             return here
-        return replace(here, modes=replace(modes, active=frozenset(left))).forget()
+        return here.setting(active=frozenset(left)).forget()
 
     def _begin_early(self, why: Reason, here: Arrived) -> None:
         """Note that an interrupt may come in moves before it is switched on.
@@ -475,9 +470,7 @@ class KrlMachine(TaskMachine):
         if not self.effects_of(one.action, at.place.scope):
             return here
         self._call_beside(one.action)
-        return replace(
-            here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
-        )
+        return here.blocking(_INTERRUPT)
 
     def _call_beside(self, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
@@ -567,9 +560,6 @@ def _frame(record: tuple[float, ...] | None) -> KrlFrame:
 
 def _halt(here: Arrived, halted: bool | None) -> Arrived:
     """Say that the arm stops before it goes on, or that it may (None)."""
-    modes = here.modes
-    if modes.goes_on:
-        return replace(here, modes=replace(modes, goes_on=False))
-    if modes.halted or modes.halted == halted:
-        return here
-    return replace(here, modes=replace(modes, halted=halted))
+    if here.modes.goes_on:
+        return here.setting(goes_on=False)
+    return here if here.modes.halted else here.setting(halted=halted)

@@ -284,19 +284,19 @@ class ModeReader:
             case _ if name in _BLOCKING:
                 return modes.with_(blocked=modes.blocked | {_BLOCKING[name]})
             case "$circ_mode":
-                return replace(modes, through=self._goes_through(one))
+                return modes.with_(through=self._goes_through(one))
             case "$vel" | "$vel_axis" | "$apo":
                 return self._speed(modes, one)
             case "$advance":
                 number = self._number(value)
                 ahead = None if math.isnan(number) else number > 0
-                return replace(modes, ahead=ahead)
+                return modes.with_(ahead=ahead)
             case "$load":
                 return self._load(modes, one)
             case "$ex_ax_ignore":
                 off = self._number(value) == 0.0
                 rest = modes.blocked - {IGNORED}
-                return replace(modes, blocked=rest if off else rest | {IGNORED})
+                return modes.with_(blocked=rest if off else rest | {IGNORED})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._hold_component(modes, one)
             case _ if name in abstract_state.TABLES:
@@ -416,12 +416,12 @@ class ModeReader:
         number = number_or_unknown(self._number(one.value))
         match name, step:
             case "$vel", "cp":
-                return replace(modes, speed=number)
+                return modes.with_(speed=number)
             case "$vel", "":
                 speed = self._record(one.value).number("cp")
                 if isinstance(one.value, ir.FunctionCall):  # SVEL_CP(2, , LCPDAT1)
                     speed = self._number(self._argument(one.value))
-                return replace(modes, speed=number_or_unknown(speed))
+                return modes.with_(speed=number_or_unknown(speed))
             case "$vel_axis", ir.ElementStep():
                 inside = self._argument(one.value)
                 percent = (
@@ -429,11 +429,11 @@ class ModeReader:
                     if inside is None
                     else number_or_unknown(self._number(inside))
                 )
-                return replace(modes, share=percent / 100.0 if percent > 0 else UNKNOWN)
+                return modes.with_(share=percent / 100.0 if percent > 0 else UNKNOWN)
             case "$apo", "cdis":
-                return replace(modes, distance=number)
+                return modes.with_(distance=number)
             case "$apo", "cptp":
-                return replace(modes, overlap=number)
+                return modes.with_(overlap=number)
             case "$apo", "":
                 return self._blending(modes, one.value)
         return modes
@@ -442,10 +442,9 @@ class ModeReader:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
         if isinstance(operand, ir.FunctionCall):
             held = self._record(self._argument(operand))
-            return replace(modes, distance=number_or_unknown(held.number("apo_dist")))
+            return modes.with_(distance=number_or_unknown(held.number("apo_dist")))
         found = self._record(operand)
-        return replace(
-            modes,
+        return modes.with_(
             distance=number_or_unknown(found.number("cdis")),
             overlap=number_or_unknown(found.number("cptp")),
         )
@@ -456,41 +455,41 @@ class ModeReader:
         match one.target.steps, operand:
             case ("m",), _:
                 mass, centre = self._number(operand), modes.load[1:]
-                return replace(modes, load=_load_of(mass, centre))
+                return modes.with_(load=_load_of(mass, centre))
             case ("cm",), _:
                 centre = _centre_of(self._record(operand))
                 known = centre and modes.load and modes.load != LOST_LOAD
                 load = (modes.load[0], *centre) if known else LOST_LOAD
-                return replace(modes, load=load)
+                return modes.with_(load=load)
             case ("cm", *_), _:
-                return replace(modes, load=LOST_LOAD)
+                return modes.with_(load=LOST_LOAD)
             case (), ir.FunctionCall(name="sload"):
                 return self.take_load(modes, self._number(self._argument(operand)))
             case (), ir.DataObject(name="load_data", steps=(ir.ElementStep() as step,)):
                 index = self.task.index(step, self.here) or (math.nan,)
                 return self.take_load(modes, index[0])
             case (), _:
-                return replace(modes, load=load_of(self._record(operand)))
+                return modes.with_(load=load_of(self._record(operand)))
         return modes
 
     def take_load(self, modes: KrlModes, number: float) -> KrlModes:
         """Take the load of a tool's number, as BAS and SLOAD do."""
         entry = whole(number)
         if entry is None:
-            return replace(modes, load=LOST_LOAD)
+            return modes.with_(load=LOST_LOAD)
         held = modes.store.get(abstract_state.entry_name("load_data", entry))
         if isinstance(held, tuple) and "load_data" not in self.task.beside:
-            return replace(modes, load=held)
+            return modes.with_(load=held)
         if not self.task.is_steady("load_data", entry):
-            return replace(modes, load=LOST_LOAD)
+            return modes.with_(load=LOST_LOAD)
         found = self.task.datum("load_data", self.here, (entry,))
         if entry <= 0 or found is None:
-            return replace(modes, load=CELL_LOAD)
+            return modes.with_(load=CELL_LOAD)
         file, datum = found
         there = Scope(file, self.task.files[file].name, "", row=datum.row)
         value = self.task.value(datum.value, there)
         load = load_of(value) if isinstance(value, KnownRecord) else LOST_LOAD
-        return replace(modes, load=load)
+        return modes.with_(load=load)
 
     # BAS(#command, value), as the controller's bas.src carries it out.
 
@@ -514,19 +513,19 @@ class ModeReader:
                 modes = self.take_load(modes, value) if word == "#tool" else modes
                 return modes.with_(**{word[1:]: found})
             case "#vel_ptp":
-                return replace(modes, share=_share(value))
+                return modes.with_(share=_share(value))
             case "#vel_cp":
-                return replace(modes, speed=number_or_unknown(value))
+                return modes.with_(speed=number_or_unknown(value))
             case "#ptp_dat":
                 return self._joint_data(modes)
             case "#cp_dat":
                 return self._path_data(modes)
             case "#ptp_params":
                 changed = self._frames(self._joint_data(modes))
-                return replace(changed, share=_share(value))
+                return changed.with_(share=_share(value))
             case "#cp_params":
                 changed = self._frames(self._path_data(modes))
-                return replace(changed, speed=number_or_unknown(value))
+                return changed.with_(speed=number_or_unknown(value))
         return modes if word in BAS_HARMLESS else modes.forget()
 
     def _initial(self, modes: KrlModes) -> KrlModes:
@@ -544,8 +543,7 @@ class ModeReader:
             return self._number(ir.DataObject(name))
 
         advance = number("def_advance")
-        return replace(
-            modes,
+        return modes.with_(
             tool=reader.entry("tool_data", 1),
             base=reader.read_numbered("$base", 0),
             interpolation="#base",
@@ -584,8 +582,8 @@ class ModeReader:
         held = modes.pdat if isinstance(modes.pdat, KnownRecord) else KnownRecord(())
         size = number_or_unknown(held.number("apo_dist"))
         if held.get("apo_mode") == "#cdis":
-            return replace(modes, distance=size, overlap=UNKNOWN)
-        return replace(modes, overlap=size)
+            return modes.with_(distance=size, overlap=UNKNOWN)
+        return modes.with_(overlap=size)
 
     def _path_data(self, modes: KrlModes) -> KrlModes:
         """Take blending and orientation of LDAT_ACT."""
@@ -594,8 +592,7 @@ class ModeReader:
         word, circle = held.get("ori_typ"), held.get("circ_typ")
         if held.whole and circle is None:  # which may be left out
             circle = self._default_circle
-        return replace(
-            modes,
+        return modes.with_(
             distance=number_or_unknown(held.number("apo_dist")),
             orientation=word if isinstance(word, str) else "",
             circle=circle if isinstance(circle, str) else "",

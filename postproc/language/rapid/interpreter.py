@@ -94,7 +94,7 @@ class RapidMachine(TaskMachine):
         every = [one for own in self.task.routines.values() for one in own]
         traps = [one for one in every if one.rows.head.kind == "trap"]
         if any(map(self.routine_effects, traps)):
-            here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
+            here = here.blocking(_TRAP)
         for routine in found:
             self.call_routine(routine, None, here)
         self.follow()
@@ -169,11 +169,7 @@ class RapidMachine(TaskMachine):
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
-        if self._handlers_of(context).moves:
-            here = replace(
-                here, modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER})
-            )
-        return here
+        return here.blocking(_HANDLER) if self._handlers_of(context).moves else here
 
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
@@ -219,7 +215,7 @@ class RapidMachine(TaskMachine):
             if not self._may_raise(one, way.numbers):
                 continue
             if not beside:
-                self._handle(at, way, replace(here, origins=NOWHERE))
+                self._handle(at, way, here.elsewhere())
             elif beside.row > at.row and errors.may_be_skipped(one):
                 self._handle(at, way, here)
 
@@ -234,7 +230,7 @@ class RapidMachine(TaskMachine):
         for way in self._exits_of(at.context):
             named = way.numbers is not None and bool(way.numbers & errors.PATH_ERRORS)
             if way.own and (named or (always and self._may_raise(one, way.numbers))):
-                self._handle(at, way, replace(here, origins=NOWHERE))
+                self._handle(at, way, here.elsewhere())
 
     def _handle(self, at: At, way: errors.ErrorExit, here: Arrived) -> None:
         """Go on behind an error."""
@@ -349,7 +345,7 @@ class RapidMachine(TaskMachine):
             return here.forget()
         if kind == "modal":
             changed = self._change_modes(one, scope_at(at, here), here.modes)
-            return replace(here, modes=changed.allowing())
+            return here.with_modes(changed.allowing())
         if kind in ("still", "modal") or self.declares_motionless(name):
             return here
         if name == BY_NAME:
@@ -373,7 +369,7 @@ class RapidMachine(TaskMachine):
         after = self.arrive(at, one, here)
         (last,) = after.origins
         if math.isnan(self.visits[last].zone_mm):
-            after = replace(after, modes=after.modes.settle())
+            after = after.with_modes(after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(at, one, after)
         return after
@@ -392,8 +388,9 @@ class RapidMachine(TaskMachine):
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
             here = self.unknown(at, here, what)
-        modes = here.modes.allowing(ANYTHING if given is None else given)
-        return replace(here, modes=modes)
+        return here.with_modes(
+            here.modes.allowing(ANYTHING if given is None else given)
+        )
 
     def _list_set_modes(
         self, routine: TaskRoutine

@@ -166,32 +166,32 @@ def change_modes(
             checked = Switch.ON if switches <= {"on"} else Switch.UNKNOWN
             checked = Switch.OFF if switches == {"off"} else checked
             if name == "confl":
-                return replace(modes, confl=checked)
-            return replace(modes, confj=checked)
+                return modes.with_(confl=checked)
+            return modes.with_(confj=checked)
         case "pdispoff":
-            return replace(modes, shift=NO_SHIFT)
+            return modes.with_(shift=NO_SHIFT)
         case "pdispset":
-            return replace(modes, shift=pose(placed[0] if placed else None))
+            return modes.with_(shift=pose(placed[0] if placed else None))
         case "pdispon":
-            return replace(modes, shift=UNKNOWN_SHIFT)
+            return modes.with_(shift=UNKNOWN_SHIFT)
         case "singarea":
             return _singular(switches, modes)
         case "cirpathmode":
-            return replace(modes, arc_law=_ARC_LAWS.get(frozenset(switches), LOST.law))
+            return modes.with_(arc_law=_ARC_LAWS.get(frozenset(switches), LOST.law))
         case "velset":
             share = number(placed[0] if placed else None) / 100.0
-            return replace(modes, override=share if 0.0 < share <= 1.0 else 0.0)
+            return modes.with_(override=share if 0.0 < share <= 1.0 else 0.0)
         case "speedlimaxis" | "speedlimcheckpoint":
-            return replace(modes, override=0.0)
+            return modes.with_(override=0.0)
         case "gripload":
-            return replace(modes, grip=load(placed[0] if placed else None))
+            return modes.with_(grip=load(placed[0] if placed else None))
     which = _which(name, placed)
     if name in BLOCKING:
         begun = _about(BLOCKING[name][1], which)
-        return replace(modes, blocked=modes.blocked | {begun})
+        return modes.with_(blocked=modes.blocked | {begun})
     if name in _ENDING:
         kept = {why for why in modes.blocked if not _ends(name, which, why)}
-        return replace(modes, blocked=frozenset(kept))
+        return modes.with_(blocked=frozenset(kept))
     return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
 
 
@@ -252,4 +252,4 @@ def _singular(switches: set[str], modes: Modes) -> Modes:
     laws = {"off": OrientationLaw.ONE_AXIS, "wrist": OrientationLaw.WRIST_JOINTS}
     (word,) = switches if len(switches) == 1 else ("",)
     law = laws.get(word, OrientationLaw.UNKNOWN)
-    return replace(modes, law=law, wrist=word == "wrist")
+    return modes.with_(law=law, wrist=word == "wrist")
