@@ -14,7 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
-from postproc.language.krl import abstract_state, pose_encoding
+from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
 
@@ -124,7 +124,7 @@ class FrameReader:
             return no_frame(_DOUBLE.format(table.upper()))
         found = ZERO if entry <= 0 else self.entry(table, entry)
         first, second = (
-            self._correction(name, *pair) for pair in abstract_state.CORRECTIONS[name]
+            self._correction(name, *pair) for pair in symbols.CORRECTIONS[name]
         )
         return self._product(self._product(first, found), second)
 
@@ -134,7 +134,7 @@ class FrameReader:
         if on is None:
             on = self.task.initial_switch(switch)
         found = self._read_held(frame, frame)
-        if on is False or (on == abstract_state.PERHAPS and found == ZERO):
+        if on is False or (on == symbols.PERHAPS and found == ZERO):
             return ZERO
         shown = name.upper()
         if on is not True:
@@ -156,7 +156,7 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        held = self._read_held(table, abstract_state.entry_name(table, number))
+        held = self._read_held(table, symbols.entry_name(table, number))
         if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):

@@ -23,7 +23,6 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.krl import syntax as said
-from postproc.language.krl.abstract_state import HELD
 from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modal_state import (
     HALTING,
@@ -37,6 +36,7 @@ from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
     FUNCTIONS,
+    HELD,
     STILL,
     KrlTask,
     list_calls,

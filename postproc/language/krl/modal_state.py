@@ -14,7 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.modal_state import ModalState
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value
-from postproc.language.krl import abstract_state
+from postproc.language.krl import symbols
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import (
     NUMBERS,
@@ -138,8 +138,8 @@ _LAWS = {
 }
 _BOOLS = ("true", "false")
 _SWITCHED_OFF: Sequence[tuple[str, object]] = (
-    *((name, False) for name in sorted(abstract_state.SWITCHES)),
-    *((name, ZERO) for name in sorted(abstract_state.CORRECTION_FRAMES)),
+    *((name, False) for name in sorted(symbols.SWITCHES)),
+    *((name, ZERO) for name in sorted(symbols.CORRECTION_FRAMES)),
 )
 _KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
@@ -299,9 +299,9 @@ class ModeReader:
                 return modes.with_(blocked=rest if off else rest | {IGNORED})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._hold_component(modes, one)
-            case _ if name in abstract_state.TABLES:
+            case _ if name in symbols.TABLES:
                 return self._entry(modes, one)
-            case _ if name in abstract_state.HELD:
+            case _ if name in symbols.HELD:
                 return self._correction(modes, one)
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
@@ -329,7 +329,7 @@ class ModeReader:
             index = self.task.index(one.target.steps[0], self.here)
         if index is None or len(index) != 1:
             return modes.drop(table)
-        key, parts = abstract_state.entry_name(table, index[0]), one.target.steps[1:]
+        key, parts = symbols.entry_name(table, index[0]), one.target.steps[1:]
         value: object | None = None
         if not self.task.is_global(table, self.here):
             return modes.hold(key, value)
@@ -362,7 +362,7 @@ class ModeReader:
         name, value = one.target.name, None
         if one.target.steps or not self.task.is_global(name, self.here):
             return modes.hold(name, None)
-        if name in abstract_state.SWITCHES:
+        if name in symbols.SWITCHES:
             value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
             return modes.hold(name, value)
         found = self.frames(modes).frame(one.value)
@@ -477,7 +477,7 @@ class ModeReader:
         entry = whole(number)
         if entry is None:
             return modes.with_(load=LOST_LOAD)
-        held = modes.store.get(abstract_state.entry_name("load_data", entry))
+        held = modes.store.get(symbols.entry_name("load_data", entry))
         if isinstance(held, tuple) and "load_data" not in self.task.beside:
             return modes.with_(load=held)
         if not self.task.is_steady("load_data", entry):
@@ -533,10 +533,10 @@ class ModeReader:
 
         Speeds and distances are those of ``$config.dat``. The load stays what it is.
         """
-        linked = modes.store.get(_KEPT_ON) in (True, abstract_state.PERHAPS)
+        linked = modes.store.get(_KEPT_ON) in (True, symbols.PERHAPS)
         for name, value in _SWITCHED_OFF:
             modes = modes.hold(name, value)
-        modes = modes.hold(_KEPT_ON, abstract_state.PERHAPS) if linked else modes
+        modes = modes.hold(_KEPT_ON, symbols.PERHAPS) if linked else modes
         reader = self.frames(modes)
 
         def number(name: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
@@ -35,9 +35,7 @@ from postproc.language.rapid.modal_state import (
     ANYTHING,
     AT_START,
     HARMLESS,
-    Modes,
-    change_modes,
-    list_set_modes,
+    ModeReader,
 )
 from postproc.language.rapid.moves import (
     Goals,
@@ -131,15 +129,9 @@ class RapidMachine(TaskMachine):
             ):  # fmt: skip
                 one = inside(text.statement(row))
                 if isinstance(one, ir.Instruction):
-                    given = self._list_set(one, scope.at(row))
+                    given = self._modes(scope.at(row)).list_set(one)
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
-
-    def _list_set(
-        self, one: ir.Instruction, scope: Scope
-    ) -> frozenset[tuple[str, Any]]:
-        """Return the modes that an instruction sets, whatever holds before it."""
-        return list_set_modes(partial(self._change_modes, one, scope))
 
     def _procedures(self) -> list[TaskRoutine]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -344,7 +336,7 @@ class RapidMachine(TaskMachine):
             self.lost |= here.origins
             return here.forget()
         if kind == "modal":
-            changed = self._change_modes(one, scope_at(at, here), here.modes)
+            changed = self._modes(scope_at(at, here)).change(one, here.modes)
             return here.with_modes(changed.allowing())
         if kind in ("still", "modal") or self.declares_motionless(name):
             return here
@@ -354,10 +346,9 @@ class RapidMachine(TaskMachine):
             return self.unknown(at, here, _LEFT)
         return self.outside(at, name, here)
 
-    def _change_modes(self, one: ir.Instruction, scope: Scope, modes: Modes) -> Modes:
-        """Carry out an instruction that changes how the moves after it are."""
-        return change_modes(
-            one.name, one.arguments, modes,
+    def _modes(self, scope: Scope) -> ModeReader:
+        """Return what carries out instructions that stand somewhere."""
+        return ModeReader(
             lambda operand: self.task.number(operand, scope),
             lambda operand: pose_of(self.task.value(operand, scope)),
             lambda operand: self.goals.load(operand, scope),
@@ -410,7 +401,7 @@ class RapidMachine(TaskMachine):
             if isinstance(one, ir.Instruction) and not own:
                 kind = read_known_instructions().get(one.name)
                 if kind == "modal" and one.name not in STOPPED:
-                    found |= self._list_set(one, scope.at(row))
+                    found |= self._modes(scope.at(row)).list_set(one)
                     continue
                 if kind == "still" or self.declares_motionless(one.name):
                     continue

@@ -95,8 +95,7 @@ def read_rapid(source: Source) -> RapidFile:
     # Without its end, calls may stand behind a record.
     ended = (r for r in outline.of("record") if r.ended)
     within = {row for r in ended for row in range(r.first, r.last + 1)}
-    moves = text.find_rows(is_move)
-    moves = moves[~np.isin(moves, sorted(within))] if within else moves
+    moves = [row for row in text.where(is_move) if row not in within]
     for row in (row for row in text.where(_lacks_position) if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
     for row in (row for row in odd if row not in within):
@@ -105,7 +104,7 @@ def read_rapid(source: Source) -> RapidFile:
         text,
         tuple(outline.of(*_ROUTINES)),
         tuple(outline.data),
-        moves,
+        np.array(moves, dtype=np.int32),
         tuple(sorted({*outline.diagnostics})),
         tuple(outline.of("module")),
     )

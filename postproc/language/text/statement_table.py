@@ -66,10 +66,10 @@ class Statements(Generic[T]):
         rows: list[int] = np.flatnonzero(self.which(test)).tolist()
         return rows
 
-    def find_rows(
+    def where(
         self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
-    ) -> Indices:
-        """Return statements that pass a test, which is asked once for each shape.
+    ) -> list[int]:
+        """List statements that pass a test, which is asked once for each shape.
 
         Args:
             test: The test.
@@ -80,14 +80,7 @@ class Statements(Generic[T]):
         number, example = templates.number_in_order(shape)
         passed = [test(self.said[k]) for k in shape[example].tolist()]
         rows = first + np.flatnonzero(np.array(passed, dtype=bool)[number])
-        return rows.astype(np.int32)
-
-    def where(
-        self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
-    ) -> list[int]:
-        """List statements that pass a test, as `find_rows`."""
-        rows: list[int] = self.find_rows(test, first, behind).tolist()
-        return rows
+        return [*rows.tolist()]
 
     def line(self, row: int) -> int:
         """Return the 1-based line that a statement begins on."""
