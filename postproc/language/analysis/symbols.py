@@ -203,12 +203,21 @@ class TaskSymbols(ABC, Generic[F]):
         return found
 
     @cached_property
+    def every_routine(self) -> Sequence[TaskRoutine]:
+        """All routines, by name as they come first."""
+        return [one for own in self.routines.values() for one in own]
+
+    @cached_property
+    def every_datum(self) -> Sequence[Datum]:
+        """All data that files declare."""
+        return [datum for file in self.files for datum in file.data]
+
+    @cached_property
     def routines_by_file(self) -> Mapping[int, list[TaskRoutine]]:
         """Routines by the file that they stand in."""
         found: dict[int, list[TaskRoutine]] = defaultdict(list)
-        for own in self.routines.values():
-            for one in own:
-                found[one.file].append(one)
+        for one in self.every_routine:
+            found[one.file].append(one)
         return found
 
     def routine(self, name: str, here: Scope) -> TaskRoutine | None:
@@ -273,7 +282,7 @@ class TaskSymbols(ABC, Generic[F]):
     @cached_property
     def declared(self) -> frozenset[str]:
         """Names of all data."""
-        return frozenset(datum.name for file in self.files for datum in file.data)
+        return frozenset(datum.name for datum in self.every_datum)
 
     @cached_property
     def taught_lines(self) -> Sequence[frozenset[int]]:
@@ -290,10 +299,9 @@ class TaskSymbols(ABC, Generic[F]):
             for one in () if file.is_submit else self._list_live(number):
                 self.note_in(uses, file, one)
         self.note_odd(uses)
-        data = [datum for file in self.files for datum in file.data]
-        kept = {datum.name for datum in data if self.outlives(datum)}
-        for own in self.routines.values():  # parameters may stand for any data
-            kept.update(one.name for r in own for one in r.rows.head.parameters)
+        kept = {datum.name for datum in self.every_datum if self.outlives(datum)}
+        for routine in self.every_routine:  # parameters may stand for any data
+            kept.update(one.name for one in routine.rows.head.parameters)
         alone = self.declared - kept
         uses.read |= {one for target, one in uses.copies if target not in alone}
         uses.pass_on()
@@ -318,8 +326,7 @@ class TaskSymbols(ABC, Generic[F]):
         One that other files know counts as if it were called: by a program that is not
         at hand, or by the operator.
         """
-        every = (one for own in self.routines.values() for one in own)
-        local = [one for one in every if one.rows.head.local]
+        local = [one for one in self.every_routine if one.rows.head.local]
         if not local or self.calls_by_text:
             return frozenset()
         calls, found = ir.Instruction | ir.FunctionCall, set(self.odd_words)

@@ -301,7 +301,7 @@ class TaskMachine(Interpreter[Arrived]):
     ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
         """Return all calls of routines of the task, and where they stand."""
         found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
-        for routine in (one for own in self.task.routines.values() for one in own):
+        for routine in self.task.every_routine:
             for row in routine.inside:
                 one = self.inside(self.texts[routine.file].statement(row))
                 if isinstance(one, ir.Instruction):

@@ -162,13 +162,10 @@ class FrameReader:
         if not self.task.is_steady(table, number):
             return None
         found = self.task.datum(table, self.here, (number,))
-        if found is None or found[1].value is None:
+        pose = pose_of(self.task.entry(table, number, self.here))
+        if found is None or not pose:
             return None
-        file, datum = found
-        there = Scope(file, self.task.files[file].name, "", row=datum.row)
-        pose = pose_of(self.task.value(datum.value, there))
-        taught = self.task.is_taught(table, file, datum.row)
-        return KrlFrame(pose, taught=taught) if pose else None
+        return KrlFrame(pose, taught=self.task.is_taught(table, found[0], found[1].row))
 
     def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
@@ -178,16 +175,11 @@ class FrameReader:
         """Tell whether a base hangs on an external axis, or may be hung on one."""
         if "machine_frame_dat" in self.task.written:
             return True
-        found = self.task.datum("machine_frame_dat", self.here, (number,))
-        if found is None:
+        if self.task.datum("machine_frame_dat", self.here, (number,)) is None:
             return False
-        file, datum = found
-        there = Scope(file, self.task.files[file].name, "", row=datum.row)
-        value = self.task.value(datum.value, there)
-        known = (
-            value.number("mach_def_index") if isinstance(value, KnownRecord) else 1.0
-        )
-        return not known == 0.0
+        value = self.task.entry("machine_frame_dat", number, self.here)
+        free = isinstance(value, KnownRecord) and value.number("mach_def_index") == 0.0
+        return not free
 
     def _unknown(self, shown: str, name: str) -> Reason:
         code, text = self.task.explain_unknown(name, self.here)

@@ -482,12 +482,9 @@ class ModeReader:
             return modes.with_(load=held)
         if not self.task.is_steady("load_data", entry):
             return modes.with_(load=LOST_LOAD)
-        found = self.task.datum("load_data", self.here, (entry,))
-        if entry <= 0 or found is None:
+        if entry <= 0 or self.task.datum("load_data", self.here, (entry,)) is None:
             return modes.with_(load=CELL_LOAD)
-        file, datum = found
-        there = Scope(file, self.task.files[file].name, "", row=datum.row)
-        value = self.task.value(datum.value, there)
+        value = self.task.entry("load_data", entry, self.here)
         load = load_of(value) if isinstance(value, KnownRecord) else LOST_LOAD
         return modes.with_(load=load)
 

@@ -244,6 +244,13 @@ class KrlTask(TaskSymbols[KrlFile]):
         place = self.place(name, here)
         return place is None or place[1] == CONFIG
 
+    def entry(self, table: str, number: int, here: Scope) -> Value | None:
+        """Return what an entry of a table holds at first, None where not known."""
+        found = self.datum(table, here, (number,))
+        if found is None:
+            return None
+        return self.value(found[1].value, self.scope_of_datum(*found))
+
     def is_steady(self, table: str, number: int) -> bool:
         """Return True if no statement of the files may change an entry of a table."""
         return not ({number, ANY} & self._entries_written[table])
@@ -274,11 +281,8 @@ class KrlTask(TaskSymbols[KrlFile]):
         A switch that no file sets is FALSE, unless a list declares it TRUE: what ran
         before may have left it so.
         """
-        own = [
-            datum for file in self.files for datum in file.data if datum.name == name
-        ]
-        values = [one.value for one in own if one.value is not None]
-        off = all(is_word(value, "false") for value in values)
+        own = (one.value for one in self.every_datum if one.name == name)
+        off = all(is_word(value, "false") for value in own if value is not None)
         return False if off and name not in self.written else None
 
     @cached_property
@@ -373,8 +377,8 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def _points(self) -> frozenset[str]:
         """Names of data that are positions."""
-        data = (datum for file in self.files for datum in file.data)
-        return frozenset(one.name for one in data if one.type in POSITIONS)
+        points = (one for one in self.every_datum if one.type in POSITIONS)
+        return frozenset(one.name for one in points)
 
     def is_taught(self, name: str, file: int, row: int) -> bool:
         """Return True if data of a statement were taught, by the cell or a comment."""

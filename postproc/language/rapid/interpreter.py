@@ -84,14 +84,12 @@ class RapidMachine(TaskMachine):
     def run(self) -> None:
         """Follow every way from the main routine."""
         mains = self.task.routines.get("main", [])
-        found = mains if len(mains) == 1 else self._procedures()
+        found = mains if len(mains) == 1 else self._of_kind("proc")
         here = self.begin(frozenset([START]), AT_START)
         if len(mains) != 1:
             here = here.forget()
             self.say(Scope(0, "", "", row=0), Code.NO_MAIN, _NO_MAIN)
-        every = [one for own in self.task.routines.values() for one in own]
-        traps = [one for one in every if one.rows.head.kind == "trap"]
-        if any(map(self.routine_effects, traps)):
+        if any(map(self.routine_effects, self._of_kind("trap"))):
             here = here.blocking(_TRAP)
         for routine in found:
             self.call_routine(routine, None, here)
@@ -120,7 +118,7 @@ class RapidMachine(TaskMachine):
         known, found = read_known_instructions(), set[tuple[str, Any]]()
         modal = {name for name, kind in known.items() if kind == "modal"}
         modal -= {*self.task.routines, *STOPPED}
-        for routine in (r for own in self.task.routines.values() for r in own):
+        for routine in self.task.every_routine:
             scope, rows = self.task.scope_of(routine), routine.inside
             text = self.texts[routine.file]
             for row in text.where(
@@ -133,9 +131,9 @@ class RapidMachine(TaskMachine):
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
 
-    def _procedures(self) -> list[TaskRoutine]:
-        routines = (one for found in self.task.routines.values() for one in found)
-        return [one for one in routines if one.rows.head.kind == "proc"]
+    def _of_kind(self, kind: str) -> list[TaskRoutine]:
+        """Return all routines of a kind."""
+        return [one for one in self.task.every_routine if one.rows.head.kind == kind]
 
     def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return place and turn of MoveL to numbers, see `TaskMachine.places_of`."""
@@ -275,14 +273,14 @@ class RapidMachine(TaskMachine):
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""
-        for routine in self._procedures():
+        for routine in self._of_kind("proc"):
             self.run_beside(routine)
 
     def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return all procedures where a text names the one that is called."""
         inner = inside(one)
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
-            return self._procedures()
+            return self._of_kind("proc")
         return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:

@@ -183,8 +183,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     @cached_property
     def persistents(self) -> frozenset[str]:
         """Names of data that tasks share with others that declare them too."""
-        data = (datum for file in self.files for datum in file.data)
-        return frozenset(one.name for one in data if _is_shared(one))
+        return frozenset(one.name for one in self.every_datum if _is_shared(one))
 
     @cached_property
     def strange(self) -> frozenset[str]:
