@@ -212,17 +212,14 @@ class TaskMachine(Interpreter[Arrived]):
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
 
+    @property
     @abstractmethod
-    def read_visits(
-        self, one: Any, scope: Scope, here: Arrived | None
-    ) -> Iterable[Any]:
-        """Read the visits of a move, nothing for all else.
+    def goals(self) -> Any:
+        """What reads the visits of moves."""
 
-        Args:
-            one: The statement.
-            scope: Where it stands.
-            here: How the arm comes to it, None where that does not count.
-        """
+    @abstractmethod
+    def is_move(self, one: ir.SourceStatement) -> bool:
+        """Return True if a statement moves."""
 
     @abstractmethod
     def places_of(self, one: Any) -> Sequence[int] | None:
@@ -323,6 +320,23 @@ class TaskMachine(Interpreter[Arrived]):
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Allow for other ends of a routine."""
         return here
+
+    def read_visits(
+        self, one: ir.SourceStatement, scope: Scope, here: Arrived | None
+    ) -> Iterable[Any]:
+        """Read the visits of a move, nothing for all else.
+
+        Args:
+            one: The statement.
+            scope: Where it stands.
+            here: How the arm comes to it, None where that does not count.
+        """
+        one = self.inside(one)
+        if not self.is_move(one):
+            return ()
+        modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
+        found: Iterable[Any] = self.goals.visits(one, scope, modes, points)
+        return found
 
     # From statement to statement, see `Interpreter`.
 

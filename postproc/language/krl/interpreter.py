@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import NO_POINTS, Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
@@ -31,7 +31,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
+from postproc.language.krl.moves import KrlGoals, own_numbers
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -120,6 +120,10 @@ class KrlMachine(TaskMachine):
             self.say(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
 
     # What a statement is.
+
+    def is_move(self, one: ir.SourceStatement) -> bool:
+        """Return True for moves."""
+        return isinstance(one, said.KrlMove)
 
     def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
@@ -486,14 +490,6 @@ class KrlMachine(TaskMachine):
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement says what is done at another time."""
         return isinstance(one, said.InterruptDeclared | said.PathTrigger)
-
-    def read_visits(
-        self, one: Any, scope: Scope, here: Arrived | None
-    ) -> Iterator[KrlVisit]:
-        """Read the visits of a move, see `TaskMachine.read_visits`."""
-        if isinstance(one, said.KrlMove):
-            modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
-            yield from self.goals.visits(one, scope, modes, points)
 
     @cached_property
     def everywhere(self) -> frozenset[Reason]:

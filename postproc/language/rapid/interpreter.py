@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import NO_POINTS, Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.task_machine import (
@@ -39,7 +39,6 @@ from postproc.language.rapid.modal_state import (
 )
 from postproc.language.rapid.moves import (
     Goals,
-    RapidVisit,
     are_targets,
     own_numbers,
     pose_of,
@@ -142,6 +141,7 @@ class RapidMachine(TaskMachine):
         return own_numbers(one)
 
     is_plain = staticmethod(are_targets)
+    is_move = staticmethod(is_move)
     inside = staticmethod(inside)
 
     @staticmethod
@@ -292,15 +292,6 @@ class RapidMachine(TaskMachine):
         rows = routine.inside
         heads = self.texts[routine.file].where(self.handles, rows.start, rows.stop)
         yield from ((routine.file, row, rows.stop) for row in heads[:1])
-
-    def read_visits(
-        self, one: Any, scope: Scope, here: Arrived | None
-    ) -> Iterator[RapidVisit]:
-        """Read the visits of a move, see `TaskMachine.read_visits`."""
-        one = inside(one)
-        if is_move(one):
-            modes, points = (here.modes, here.points) if here else (AT_START, NO_POINTS)
-            yield from self.goals.visits(one, scope, modes, points)
 
     def _compact(
         self, at: At, inside: ir.SourceStatement, here: Arrived
