@@ -369,7 +369,7 @@ class Interpreter(ABC, Generic[S]):
 
     def _unroll(self, at: At, loop: ir.ForLoop, counting: Counting) -> bool:
         """Tell whether a loop is followed round by round."""
-        if at in self.widened:
+        if at in self.widened or at.row not in at.place.flow.end:
             return False
         if at not in self.counted:
             if not self.counts_alone(at, loop):
