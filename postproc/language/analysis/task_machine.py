@@ -426,12 +426,17 @@ class TaskMachine(Interpreter[Arrived]):
         """Find them in the statements of a routine, once for all calls of it."""
         key = place.scope.file, place.flow.first
         if key not in self._runs:
-            text = place.text
-            apart |= rows_of_lines(text, self.task.taught_lines[place.scope.file])
             self._runs[key] = find_runs(
-                text, place.flow, apart, self.places_of, self.is_plain
-            )
+                place.text, place.flow, apart | self._taught_rows[place.scope.file],
+                self.places_of, self.is_plain,
+            )  # fmt: skip
         return self._runs[key]
+
+    @cached_property
+    def _taught_rows(self) -> Sequence[set[int]]:
+        """Statements of every file that stand on lines that are marked as taught."""
+        pairs = zip(self.texts, self.task.taught_lines, strict=False)
+        return [rows_of_lines(text, lines) for text, lines in pairs]
 
     # Calls and moves.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import (
     Collection,
     Hashable,
@@ -417,10 +418,12 @@ def _find_marked(
     for file, lines in enumerate(machine.task.taught_lines):
         text = machine.texts[file]
         own = sorted(slot for at, slot in places if at == file) if lines else []
-        rows = {slot: text.row_of(slot) for slot in own}
-        for line in lines:
+        rows, of_row = {slot: text.row_of(slot) for slot in own}, defaultdict(list)
+        for slot in own:
+            of_row[rows[slot]].append(slot)
+        for line in lines if own else ():
             there = _on_line(own, rows, text, line)
-            near = (slot for slot in own if line in text.lines(rows[slot]))
+            near = (slot for row in text.rows_on(line) for slot in of_row[row])
             found |= {(file, slot) for slot in there or near}
     return found
 

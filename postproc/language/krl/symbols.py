@@ -281,9 +281,13 @@ class KrlTask(TaskSymbols[KrlFile]):
         A switch that no file sets is FALSE, unless a list declares it TRUE: what ran
         before may have left it so.
         """
-        own = (one.value for one in self.every_datum if one.name == name)
-        off = all(is_word(value, "false") for value in own if value is not None)
-        return False if off and name not in self.written else None
+        return None if name in self._switched_on | self.written else False
+
+    @cached_property
+    def _switched_on(self) -> frozenset[str]:
+        """Switches that a list gives another value than FALSE at first."""
+        given = (one for one in self.every_datum if one.name in SWITCHES and one.value)
+        return frozenset(one.name for one in given if not is_word(one.value, "false"))
 
     @cached_property
     def beside(self) -> frozenset[str]:

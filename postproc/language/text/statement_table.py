@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
@@ -110,6 +111,17 @@ class StatementText(Statements[T]):
         """Return the 1-based lines that a statement stands on."""
         begin, end = self.span(row)
         return range(self.line(row), self.source.line_of(max(end - 1, begin)) + 1)
+
+    @cached_property
+    def end_line(self) -> Indices:
+        """1-based line on which each statement ends, (n,)."""
+        return self.source.lines_of(np.maximum(self.end - 1, self.begin))
+
+    def rows_on(self, line: int) -> range:
+        """Return the statements that stand on a line, or begin or end there."""
+        begin, end = self.begin_line, self.end_line
+        behind = int(np.searchsorted(begin, line, side="right"))
+        return range(int(np.searchsorted(end, line)), behind)
 
     def row_of(self, slot: int) -> int:
         """Return the statement that a number stands in."""
