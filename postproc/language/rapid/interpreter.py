@@ -35,7 +35,7 @@ from postproc.language.rapid.modal_state import (
     ANYTHING,
     AT_START,
     HARMLESS,
-    ModeReader,
+    RapidModeReader,
 )
 from postproc.language.rapid.moves import (
     Goals,
@@ -335,9 +335,9 @@ class RapidMachine(TaskMachine):
             return self.unknown(at, here, _LEFT)
         return self.outside(at, name, here)
 
-    def _modes(self, scope: Scope) -> ModeReader:
+    def _modes(self, scope: Scope) -> RapidModeReader:
         """Return what carries out instructions that stand somewhere."""
-        return ModeReader(
+        return RapidModeReader(
             lambda operand: self.task.number(operand, scope),
             lambda operand: pose_of(self.task.value(operand, scope)),
             lambda operand: self.goals.load(operand, scope),

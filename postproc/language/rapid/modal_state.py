@@ -145,7 +145,7 @@ Read = Callable[[ir.Operand | None], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
-class ModeReader:
+class RapidModeReader:
     """Carries out instructions that change how the moves after them are.
 
     Attributes:
