@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import filterfalse, islice
 
 from postproc.arrays import Floats
+from postproc.language.ir import SourceStatement
 from postproc.language.text.comment_directives import AT_APPROACH, AT_VIA, INSERTED
 from postproc.language.text.source import (
     LONGEST_LINE,
@@ -96,7 +98,34 @@ class Splitter(ABC):
     unsized: str = ""
     keeps_aux: bool = False
 
+    # What a language says. A move is named by its file and its line there.
+
     @abstractmethod
+    def list_problems(self, file: int, line: int) -> Iterable[tuple[str, object]]:
+        """Yield what may forbid points on the way of a move, and whether it does."""
+
+    @abstractmethod
+    def statements_before(self, file: int, line: int) -> Iterator[SourceStatement]:
+        """Yield the statements in front of a move, the nearest one first."""
+
+    @abstractmethod
+    def is_setting(self, one: SourceStatement) -> bool:
+        """Return True if a statement sets how moves are made, and does no more."""
+
+    @abstractmethod
+    def is_plain_move(self, one: SourceStatement) -> bool:
+        """Return True if a statement moves, and begins no process."""
+
+    @abstractmethod
+    def layout(self, file: int, line: int) -> MoveLayout:
+        """Look at a move.
+
+        Raises:
+            CloneError: It is not understood.
+        """
+
+    # What follows from that.
+
     def hinders(self, file: int, line: int) -> str:
         """Say what in the text of a move forbids points on its way, "" for nothing.
 
@@ -104,8 +133,9 @@ class Splitter(ABC):
             file: Where the move stands.
             line: Its line there.
         """
+        found = (text for text, hinders in self.list_problems(file, line) if hinders)
+        return next(found, "")
 
-    @abstractmethod
     def stops(self, file: int, line: int) -> bool:
         """Tell whether the arm may stop once more before a move.
 
@@ -115,14 +145,8 @@ class Splitter(ABC):
             file: Where the move stands.
             line: Its line there.
         """
-
-    @abstractmethod
-    def layout(self, file: int, line: int) -> MoveLayout:
-        """Look at a move.
-
-        Raises:
-            CloneError: It is not understood.
-        """
+        others = filterfalse(self.is_setting, self.statements_before(file, line))
+        return any(map(self.is_plain_move, islice(others, 1)))
 
     def points(
         self, file: int, line: int, numbers: Floats, config: str, stop: bool
@@ -205,17 +229,27 @@ def spell(numbers: Floats, decimals: Sequence[int]) -> list[str]:
     return [f"{x:.{d}f}" for x, d in zip(numbers, decimals, strict=True)]
 
 
-def split_arguments(text: str) -> list[Span]:
-    """Split a text at its commas outside of brackets and strings, blanks stripped.
+def split_arguments(code: str, begin: int, end: int | None = None) -> list[Span]:
+    """Split a part of a text at its commas outside of brackets and strings.
+
+    Args:
+        code: The text.
+        begin: Where the part begins.
+        end: Where it ends; default: with the text.
+
+    Returns:
+        Where the pieces stand in the text, without the blanks around them.
 
     Raises:
         CloneError: A bracket or a string does not end.
 
-    >>> [tuple(part) for part in split_arguments(" a(1, 2), [b,c] ")]
-    [(1, 8), (10, 15)]
+    >>> [tuple(part) for part in split_arguments("f a(1, 2), [b,c] ", 1)]
+    [(2, 9), (11, 16)]
     """
-    depth, quoted, ends = 0, False, [-1]
-    for at, sign in enumerate(text):
+    end = len(code) if end is None else end
+    depth, quoted, ends = 0, False, [begin - 1]
+    for at in range(begin, end):
+        sign = code[at]
         quoted ^= sign == '"'
         if not quoted:
             depth += (sign in "([{") - (sign in ")]}")
@@ -224,8 +258,8 @@ def split_arguments(text: str) -> list[Span]:
     if depth or quoted:
         raise CloneError("the move is not understood")
     found = []
-    for begin, end in zip(ends, [*ends[1:], len(text)], strict=True):
-        part = text[begin + 1 : end]
-        first = begin + 1 + len(part) - len(part.lstrip())
+    for before, behind in zip(ends, [*ends[1:], end], strict=True):
+        part = code[before + 1 : behind]
+        first = before + 1 + len(part) - len(part.lstrip())
         found.append(Span(first, first + len(part.strip())))
     return found

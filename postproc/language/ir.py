@@ -57,6 +57,10 @@ class Num(Operand):
 
     slot: int
 
+    def children(self) -> Iterator[Node]:
+        """Yield nothing, at once: there are more of them than of all others."""
+        return iter(())
+
 
 @dataclass(frozen=True, slots=True)
 class StringLiteral(Operand):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
@@ -22,7 +22,7 @@ from postproc.language.text.comment_directives import (
     insertion_mark,
 )
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import Edit, Source
+from postproc.language.text.source import Edit, Source, Span, check_length
 from postproc.language.visits import Diagnostic, Literals, Visits
 
 Record = tuple[float, ...] | None
@@ -125,16 +125,41 @@ class JobReading:
     untouched: frozenset[str] = frozenset()
 
 
-class NamedPoint(Protocol):
-    """A variable that a move names as its destination."""
+@dataclass(frozen=True)
+class NamedPoint:
+    """A variable that a move names as its destination.
+
+    Attributes:
+        place: File, module and routine that declare it, "" for none, and its name.
+        name: As it is spelt.
+        file: Index of the move's file.
+        span: Of the name in the move.
+    """
+
+    place: tuple[int, str, str, str]
+    name: str
+    file: int
+    span: Span
 
     @property
     def key(self) -> str:
-        """Return a text that tells variables apart."""
+        """A text that tells variables apart."""
+        return ":".join(map(str, self.place))
 
-    @property
-    def name(self) -> str:
-        """Return its name as it is written."""
+    def rename(self, source: Source, name: str) -> tuple[int, Edit]:
+        """Let the move name another variable.
+
+        Args:
+            source: The move's file.
+            name: Of the other variable.
+
+        Raises:
+            CloneError: Its line would get too long.
+        """
+        start, end = self.span
+        line = source.line_text(source.line_of(start))
+        check_length(source, len(line) + len(name) - (end - start))
+        return self.file, Edit(self.span, name.encode("latin-1"))
 
 
 class Cloner(ABC):

@@ -246,7 +246,8 @@ def test_an_element_of_which_one_that_only_the_run_tells_is_a_copy(
     )
     text = RAPID.replace("VAR num n;", row, 1) % (body, ROUTINES["rapid"])
     found = read_program({"job.mod": text.encode()}, bench_cell).visits
-    assert codes(found)[0] and found.literals.pinned[found.target.literal[1]]
+    why = found.literals.pinned[found.target.literal[1]]
+    assert codes(found)[0] and "a move goes to s, which row is copied to" in why
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

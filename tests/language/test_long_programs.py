@@ -92,3 +92,21 @@ def test_calls_are_found_in_lines_with_brackets(text):
     found = [(one.span(), one[1]) for one in krl_files._find_calls(data)]
     assert found == wanted
     assert all(re.search(rb"\(\Z", data[a:b]) for (a, b), _ in found)
+
+
+def taught(n):
+    """Write routines that each go to a point on a line that is marked as taught."""
+    point = "[[500,0,500],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    lines = [f"CONST robtarget p{k}:={point};" for k in range(n)]
+    lines += ["PROC main()", *(f"r{k};" for k in range(n)), "ENDPROC"]
+    for k in range(n):
+        lines += [f"PROC r{k}()", f"MoveL p{k},v200,fine,tool0; ! TAUGHT", "ENDPROC"]
+    return {"job.mod": "\n".join(["MODULE m", *lines, "ENDMODULE", ""]).encode()}
+
+
+def test_twice_the_taught_moves_take_twice_the_calls(bench_cell):
+    half, whole = taught(150), taught(300)
+    read_program(half, bench_cell)  # what is remembered between programs
+    counts = [calls_of(lambda job=job: read_program(job, bench_cell))
+              for job in (half, whole)]  # fmt: skip
+    assert counts[1] < 2.3 * counts[0]

@@ -206,6 +206,11 @@ class Scope:
     points: Points = NO_POINTS
     row: int = -1
 
+    @property
+    def place(self) -> tuple[int, str, str]:
+        """Its file, module and routine."""
+        return self.file, self.module, self.routine
+
     def at(self, row: int) -> Scope:
         """Return where another statement of the routine stands."""
         return replace(self, row=row)

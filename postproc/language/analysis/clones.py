@@ -6,43 +6,15 @@ import re
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Place
-from postproc.language.analysis.declarations import Datum, TaskFile
+from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.language import Cloner, NamedPoint
-from postproc.language.text.source import (
-    CloneError,
-    Edit,
-    Span,
-    check_length,
-    find_free_name,
-)
+from postproc.language.text.source import CloneError, Edit, Span, find_free_name
 from postproc.language.visits import Literals
-
-
-@dataclass(frozen=True)
-class TaskPoint:
-    """Data that a move names as its destination.
-
-    Attributes:
-        place: Where they are declared.
-        name: Their name as it is spelt.
-        file: Index of the move's file.
-        span: Of the name in the move.
-    """
-
-    place: Place
-    name: str
-    file: int
-    span: Span
-
-    @property
-    def key(self) -> str:
-        """A text that tells data apart."""
-        return ":".join(map(str, self.place))
 
 
 @dataclass
@@ -64,11 +36,8 @@ class TaskCloner(Cloner):
     quiet: ClassVar[re.Pattern[str]]
 
     def __post_init__(self) -> None:
-        """Take the words of the files."""
-        self.take_words(self.task.files)
-
-    def take_words(self, files: Sequence[TaskFile]) -> None:
-        """Give no clone a name that stands in some files."""
+        """Take the words of the files: data of one name may be shared by all."""
+        files = (*self.task.files, *self.task.files_beside)
         texts = (file.text.source.data for file in files)
         words = (word for text in texts for word in self.word.findall(text))
         self.taken |= {word.decode("latin-1").lower() for word in words}
@@ -93,7 +62,7 @@ class TaskCloner(Cloner):
 
     @abstractmethod
     def declare(
-        self, points: Sequence[TaskPoint], data: Sequence[tuple[int, Datum]], name: str
+        self, points: Sequence[NamedPoint], data: Sequence[tuple[int, Datum]], name: str
     ) -> tuple[int, Edit]:
         """Declare a clone.
 
@@ -114,7 +83,7 @@ class TaskCloner(Cloner):
         """Spell the name of data that a move writes in some way."""
         return written
 
-    def target(self, file: int, line: int, via: bool, name: str) -> TaskPoint:
+    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
         """Find the data that a move goes to, as far as they can be cloned."""
         text, row = self.task.files[file].text, self.task.files[file].find_move(line)
         data = self.end_of(text.statement(row), via)
@@ -132,7 +101,7 @@ class TaskCloner(Cloner):
         self.check_move(file, line)
         span = self.find_name(file, row, data.name)
         written = text.source.text[span.start : span.end]
-        return TaskPoint(place, self.spell(data, place, written), file, span)
+        return NamedPoint(place, self.spell(data, place, written), file, span)
 
     def find_name(self, file: int, row: int, name: str) -> Span:
         """Find the only place in a statement that names data."""
@@ -147,8 +116,7 @@ class TaskCloner(Cloner):
 
     def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares data."""
-        place = cast(TaskPoint, named).place
-        file, datum = next(iter(self.task.data_at(place).values()))
+        file, datum = next(iter(self.task.data_at(named.place).values()))
         line: int = self.task.files[file].text.line(datum.row)
         return line
 
@@ -156,8 +124,7 @@ class TaskCloner(Cloner):
         self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
     ) -> tuple[str, list[tuple[int, Edit]]]:
         """Give some moves data of their own, see `Cloner.clone`."""
-        points = [cast(TaskPoint, one) for one in named]
-        every = self.task.data_at(points[0].place).values()
+        every = self.task.data_at(named[0].place).values()
         data = [one for one in every if one[1].value is not None]
         files = {file for file, _ in data}
         spans = [self.task.files[file].text.span(one.row) for file, one in data]
@@ -166,11 +133,8 @@ class TaskCloner(Cloner):
             inside = all(any(b <= at < e for b, e in spans) for at in starts if at >= 0)
             if {int(literals.file[row])} != files or not inside:
                 raise CloneError("its numbers stand in other data")
-        name = find_free_name(points[0].name, self.taken, self.longest_name)
-        edits = [self.declare(points, data, name)]
-        for point in points:
-            source, (start, end) = self.task.files[point.file].text.source, point.span
-            line = source.line_text(source.line_of(start))
-            check_length(source, len(line) + len(name) - (end - start))
-            edits.append((point.file, Edit(point.span, name.encode("latin-1"))))
+        name = find_free_name(named[0].name, self.taken, self.longest_name)
+        edits = [self.declare(named, data, name)]
+        for one in named:
+            edits.append(one.rename(self.task.files[one.file].text.source, name))
         return name.lower(), edits

@@ -226,6 +226,8 @@ class FoundVisit:
             where they go: this one is the first.
         agreed: The points that it names hold the same on every way here.
         taken: What assignments gave to the frames and other data that it names.
+        left: With what the program went on behind it the last time: modes, points, and
+            where else the arm may come from.
     """
 
     scope: Scope
@@ -241,6 +243,7 @@ class FoundVisit:
     count: int = 1
     agreed: bool = True
     taken: frozenset[AssignedPoint] = frozenset()
+    left: tuple[Any, Any, frozenset[int]] | None = None
 
     @property
     def row(self) -> int:

@@ -131,6 +131,8 @@ class GoalReader(ABC):
 
     def end(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a destination, and note what it takes of assigned points."""
+        if not self.here.points.routines:
+            return self.goal(operand)
         watched = self.here.points.watch()
         goal = self.at(replace(self.here, points=watched)).goal(operand)
         return replace(goal, given=watched.given) if watched.given else goal
@@ -189,16 +191,20 @@ class GoalReader(ABC):
         if goal is None:
             why = self.explain_unknown(name) if name else AT_RUN_TIME
             return self.unknown(why, name)
-        if goal.target == Meaning.UNKNOWN or not (name or goal.slots[0] >= 0):
+        if goal.target == Meaning.UNKNOWN:
+            return replace(goal, name=name)
+        if not (name or goal.slots[0] >= 0):
             return goal
         if goal.file >= 0 and not self._is_own(goal, operand):
             goal = replace(goal, file=-1, slots=(-1,) * len(goal.slots))
             goal = replace(goal, why=goal.why or COMPUTED)
-        if not name:
-            return goal
+        return self.name_goal(goal, name, self._spell_steps(operand)) if name else goal
+
+    def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
+        """Return the goal of a move that names data, and elements of them."""
         return replace(
-            goal, name=name + self._spell_steps(operand),
-            pins=self.explain_pinned(name, goal.file), shared=self.is_shared(name),
+            goal, name=name + steps, pins=self.explain_pinned(name, goal.file),
+            shared=self.is_shared(name),
         )  # fmt: skip
 
     def _is_own(self, goal: FoundGoal, operand: ir.Operand | None) -> bool:

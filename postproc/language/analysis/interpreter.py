@@ -118,11 +118,12 @@ class Interpreter(ABC, Generic[S]):
         None where it goes on in a routine, or where the language goes on by itself.
         """
 
-    def run_block(self, at: At, state: S) -> tuple[int, S] | None:
+    def run_block(self, at: At, state: S) -> tuple[int, S | None] | None:
         """Run moves at once that differ only in where they go.
 
         Returns:
-            The row behind them and what holds there, None where none begin at a row.
+            The row behind them and what holds there, as `act`; None where none begin
+            at a row.
         """
         return None
 
@@ -252,19 +253,18 @@ class Interpreter(ABC, Generic[S]):
             self.steps += 1
             self.exhausted |= self.steps > MOST_STEPS
             if (block := self.run_block(at, state)) is not None:
-                row, state = block
-                at = at.to(row)
-                continue
-            one = at.statement
-            if ir.divides(one):
-                if at is not begin:
-                    self.go_on(at, state)
-                    return
-                one = getattr(one, "then", None) or ir.SourceStatement()
-            after = self.run_one(at, one, state)
+                row, after = block
+            else:
+                one = at.statement
+                if ir.divides(one):
+                    if at is not begin:
+                        self.go_on(at, state)
+                        return
+                    one = getattr(one, "then", None) or ir.SourceStatement()
+                row, after = at.row + 1, self.run_one(at, one, state)
             if after is None:
                 return
-            at, state = at.behind, after
+            at, state = at.to(row), after
         self.leave(begin.context, state)
 
     def run_one(self, at: At, one: ir.SourceStatement, state: S) -> S | None:
@@ -369,7 +369,7 @@ class Interpreter(ABC, Generic[S]):
 
     def _unroll(self, at: At, loop: ir.ForLoop, counting: Counting) -> bool:
         """Tell whether a loop is followed round by round."""
-        if at in self.widened:
+        if at in self.widened or at.row not in at.place.flow.end:
             return False
         if at not in self.counted:
             if not self.counts_alone(at, loop):

@@ -28,8 +28,9 @@ class ModalState(ABC):
         """Return it where nothing is known."""
 
     def with_(self: M, **changed: Any) -> M:
-        """Return it with other values."""
-        return replace(self, **changed)
+        """Return it with other values; itself where they are no others."""
+        same = all(getattr(self, name) is value for name, value in changed.items())
+        return self if same else replace(self, **changed)
 
     def join(self: M, other: M) -> M:
         """Keep what is the same on another way here."""

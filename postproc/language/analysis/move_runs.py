@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence, Set
 from itertools import pairwise
 from typing import Any
 
@@ -20,7 +20,7 @@ Runs = dict[int, int]
 def find_runs(
     text: StatementText[Any],
     flow: ControlFlow,
-    apart: Collection[int],
+    apart: Set[int],
     places_of: Callable[[Any], Sequence[int] | None],
     plain: Callable[[Floats], Bools],
 ) -> Runs:
@@ -57,7 +57,7 @@ def find_runs(
 
 
 def _alike(
-    text: StatementText[Any], flow: ControlFlow, apart: Collection[int]
+    text: StatementText[Any], flow: ControlFlow, apart: Set[int]
 ) -> Iterator[tuple[int, int]]:
     """Yield the rows of statements of one shape on one way: first, and behind."""
     shape = text.shape[flow.first : flow.last]
@@ -67,9 +67,8 @@ def _alike(
     cut[[row - flow.first for row in flow.joins if flow.first <= row < flow.last]] = (
         True
     )
-    for row in apart:
-        if flow.first <= row < flow.last:
-            cut[row - flow.first : row - flow.first + 2] = True
+    for row in apart & {*range(flow.first, flow.last)}:
+        cut[row - flow.first : row - flow.first + 2] = True
     at = np.flatnonzero(cut)
     long = np.flatnonzero(np.diff(at) >= LEAST)
     for k in long.tolist():
@@ -78,13 +77,7 @@ def _alike(
 
 def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
     """Return the statements that stand on some lines."""
-    if not lines:
-        return set()
-    begin = text.source.lines_of(text.begin)
-    end = text.source.lines_of(np.maximum(text.end - 1, text.begin))
-    wanted = np.array(sorted(lines))
-    found = np.searchsorted(wanted, begin) < np.searchsorted(wanted, end, side="right")
-    return set(np.flatnonzero(found).tolist())
+    return {row for line in lines for row in text.rows_on(line)}
 
 
 def within(counts: Ints) -> tuple[Indices, Indices]:

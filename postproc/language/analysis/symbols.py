@@ -52,6 +52,7 @@ class TaskSymbols(ABC, Generic[F]):
     Attributes:
         files: Its files, the one that runs first.
         taught: Lower-case names of data that were taught with the arm, by the cell.
+        files_beside: Files of tasks that run at the same time.
         comments: How the language writes them.
         layouts: Components of data by type.
         followed: Types of data whose assignments are followed.
@@ -66,6 +67,7 @@ class TaskSymbols(ABC, Generic[F]):
 
     files: Sequence[F]
     taught: Collection[str] = frozenset()
+    files_beside: Sequence[F] = ()
     comments: ClassVar[Comments]
     layouts: ClassVar[Mapping[str, Layout]]
     followed: ClassVar[Collection[str]]
@@ -170,6 +172,10 @@ class TaskSymbols(ABC, Generic[F]):
         """Evaluate a value that only this language has, None where it is not known."""
         return None
 
+    def values_of(self, one: ir.SourceStatement) -> list[ir.Node]:
+        """List the values that a statement takes when it runs, with all in them."""
+        return ir.walk(one)
+
     def note_in(self, uses: NamesUsed, file: F, one: ir.SourceStatement) -> None:
         """Note what a statement of a file changes and takes."""
         uses.note(one)
@@ -197,12 +203,21 @@ class TaskSymbols(ABC, Generic[F]):
         return found
 
     @cached_property
+    def every_routine(self) -> Sequence[TaskRoutine]:
+        """All routines, by name as they come first."""
+        return [one for own in self.routines.values() for one in own]
+
+    @cached_property
+    def every_datum(self) -> Sequence[Datum]:
+        """All data that files declare."""
+        return [datum for file in self.files for datum in file.data]
+
+    @cached_property
     def routines_by_file(self) -> Mapping[int, list[TaskRoutine]]:
         """Routines by the file that they stand in."""
         found: dict[int, list[TaskRoutine]] = defaultdict(list)
-        for own in self.routines.values():
-            for one in own:
-                found[one.file].append(one)
+        for one in self.every_routine:
+            found[one.file].append(one)
         return found
 
     def routine(self, name: str, here: Scope) -> TaskRoutine | None:
@@ -267,7 +282,7 @@ class TaskSymbols(ABC, Generic[F]):
     @cached_property
     def declared(self) -> frozenset[str]:
         """Names of all data."""
-        return frozenset(datum.name for file in self.files for datum in file.data)
+        return frozenset(datum.name for datum in self.every_datum)
 
     @cached_property
     def taught_lines(self) -> Sequence[frozenset[int]]:
@@ -284,24 +299,24 @@ class TaskSymbols(ABC, Generic[F]):
             for one in () if file.is_submit else self._list_live(number):
                 self.note_in(uses, file, one)
         self.note_odd(uses)
-        data = [datum for file in self.files for datum in file.data]
-        kept = {datum.name for datum in data if self.outlives(datum)}
-        for own in self.routines.values():  # parameters may stand for any data
-            kept.update(one.name for r in own for one in r.rows.head.parameters)
+        kept = {datum.name for datum in self.every_datum if self.outlives(datum)}
+        for routine in self.every_routine:  # parameters may stand for any data
+            kept.update(one.name for one in routine.rows.head.parameters)
         alone = self.declared - kept
         uses.read |= {one for target, one in uses.copies if target not in alone}
         uses.pass_on()
         return uses
 
     def _list_live(self, number: int) -> Iterable[ir.SourceStatement]:
-        """Return what the statements of a file say, but for routines that are dead."""
-        text, live = self.files[number].text, None
+        """Return what the statements of a file say, but for routines that are dead.
+
+        Those are left out that declare what is written in numbers alone.
+        """
+        text = self.files[number].text
+        live = text.which(_names_data)
         for routine in self.routines_by_file[number] if self.dead else ():
             if routine.key in self.dead:
-                live = np.ones(len(text), bool) if live is None else live
                 live[routine.inside.start : routine.inside.stop] = False
-        if live is None:
-            return text.said
         return [text.said[k] for k in np.unique(text.shape[live]).tolist()]
 
     @cached_property
@@ -311,8 +326,7 @@ class TaskSymbols(ABC, Generic[F]):
         One that other files know counts as if it were called: by a program that is not
         at hand, or by the operator.
         """
-        every = (one for own in self.routines.values() for one in own)
-        local = [one for one in every if one.rows.head.local]
+        local = [one for one in self.every_routine if one.rows.head.local]
         if not local or self.calls_by_text:
             return frozenset()
         calls, found = ir.Instruction | ir.FunctionCall, set(self.odd_words)
@@ -342,7 +356,7 @@ class TaskSymbols(ABC, Generic[F]):
     def words_of_odd(self, but: Collection[str] = ()) -> frozenset[str]:
         """Return words of what is not understood, and does not begin with some."""
         texts = (file.text for file in self.files if not file.is_submit)
-        found = (one.words(one.where(holds_odd), but) for one in texts)
+        found = (one.words(one.of_kind(holds_odd), but) for one in texts)
         return frozenset().union(*found)
 
     def list_changes(self, one: ir.SourceStatement) -> Sequence[ir.DataObject]:
@@ -823,6 +837,12 @@ def whole(value: float) -> int | None:
     (3, None, None)
     """
     return int(value) if abs(value) < LARGEST and value == int(value) else None
+
+
+def _names_data(one: ir.SourceStatement) -> bool:
+    """Return True unless a statement declares data whose values name none."""
+    values = ir.walk(one) if isinstance(one, ir.Declaration) else [ir.DataObject("")]
+    return any(isinstance(part, ir.DataObject | ir.FunctionCall) for part in values)
 
 
 def holds_odd(one: ir.SourceStatement) -> bool:

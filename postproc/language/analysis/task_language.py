@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
 from postproc.exceptions import ProgramError
-from postproc.language.analysis.declarations import TaskFile
-from postproc.language.analysis.task_machine import TaskMachine
-from postproc.language.language import JobReading, Language
+from postproc.language.analysis.clones import TaskCloner
+from postproc.language.analysis.symbols import TaskSymbols
+from postproc.language.analysis.task_machine import TaskMachine, follow
+from postproc.language.analysis.to_visits import TaskCollector
+from postproc.language.language import Cloner, JobReading, Language, Start
+from postproc.language.text.blocks import check_blocks, read_once
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.visits import Diagnostic, Visits, never_reached
+from postproc.language.text.source import Source
+from postproc.language.visits import never_reached
 
 
 class TaskLanguage(Language):
@@ -24,12 +29,55 @@ class TaskLanguage(Language):
         grammar: Name of its grammar of statements.
         begins: What its programs begin with.
         joints: What begins a line with joint angles.
+        cure: What to give instead of a file that holds no routine.
+        tells_system: What is not understood in files of the system is told, too.
+        task: What the names of its files mean.
+        machine: Follows a task.
+        collector: Makes visits of what it has found.
+        clones: Clones points of a task.
     """
 
     tells_accuracy = False
     grammar: ClassVar[str]
     begins: ClassVar[re.Pattern[bytes]]
     joints: ClassVar[re.Pattern[str]]
+    cure: ClassVar[str]
+    tells_system: ClassVar[bool] = True
+    task: ClassVar[type[TaskSymbols[Any]]]
+    machine: ClassVar[type[TaskMachine]]
+    collector: ClassVar[type[TaskCollector]]
+    clones: ClassVar[type[TaskCloner]]
+
+    # What a language says.
+
+    @staticmethod
+    @abstractmethod
+    def read_file(source: Source) -> Any:
+        """Read a file.
+
+        Raises:
+            ProgramError: A string, or a header, does not end.
+        """
+
+    @abstractmethod
+    def name_main(self, files: Sequence[Any]) -> tuple[str, str]:
+        """Name what runs first, and what a file is called."""
+
+    def is_beside(self, source: Source) -> bool:
+        """Return True for a file of a task that runs at the same time."""
+        return False
+
+    def refuse(self, files: Sequence[Any]) -> None:
+        """Refuse files that cannot be followed, or must not be corrected.
+
+        Args:
+            files: Those of the task, the one that runs first before the others.
+
+        Raises:
+            ProgramError: What is wrong.
+        """
+
+    # What follows from that.
 
     def recognises(self, text: bytes) -> bool:
         """Return True if a program begins there, behind comments and a header."""
@@ -43,38 +91,48 @@ class TaskLanguage(Language):
         """Load the parser of statements."""
         line_parser(self.grammar, "statement")
 
-    def report(
-        self, machine: TaskMachine, visits: Visits, files: Sequence[Any],
-        odd: Iterable[Diagnostic], main: tuple[str, str],
-    ) -> JobReading:  # fmt: skip
-        """Put together what was found of a job.
+    def parse(
+        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
+    ) -> TaskSymbols[Any]:
+        """Parse the files of a job, see `Language.read`.
 
-        Args:
-            machine: It has followed all ways.
-            visits: Its visits.
-            files: All that was read.
-            odd: What is not understood.
-            main: What runs first, and what a file is called.
+        Raises:
+            ProgramError: A file of the task is none, or the first holds no routine.
         """
+        own = [one for one in sources if not self.is_beside(one)]
+        others = [one for one in sources if self.is_beside(one)]
+        files = [read_once(one, known, self.read_file) for one in own]
+        for file in files:
+            check_blocks(file)
+        if not files[0].routines:
+            problem = "the file holds no routine"
+            raise ProgramError(own[0].name, problem, self.cure)
+        self.refuse(files)
+        beside = [read_once(one, known, self.read_file) for one in others]
+        return self.task(files, start.taught, beside)
+
+    def read(
+        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
+    ) -> JobReading:
+        """Read the files of a job and follow it, see `Language.read`."""
+        task = self.parse(sources, start, known)
+        machine = follow(self.machine, task, start)
+        visits = self.collector(machine).collect()
         missed = machine.find_unreached()
         machine.root.forget()
-        told = never_reached(missed, *main)
+        quiet = [f for f in task.files if f.is_system and not self.tells_system]
+        odd = (d for f in task.files if f not in quiet for d in f.diagnostics)
+        told = never_reached(missed, *self.name_main(task.files))
         found = {*odd, *machine.diagnostics, *told}
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
+        files = (*task.files, *task.files_beside)
         kept = tuple(f for f in files if f.text.source.name not in corrected)
-        texts = tuple(Skeleton.of(file.text) for file in files)
-        return JobReading(texts, visits, tuple(sorted(found)), kept, missed)
+        return JobReading(
+            tuple(Skeleton.of(file.text) for file in files), visits,
+            tuple(sorted(found)), kept, missed,
+            frozenset(file.text.source.name for file in quiet),
+        )  # fmt: skip
 
-
-def check_routines(file: TaskFile, cure: str) -> None:
-    """Refuse a program without a routine.
-
-    Args:
-        file: The program.
-        cure: What to give instead.
-
-    Raises:
-        ProgramError: It holds none.
-    """
-    if not file.routines:
-        raise ProgramError(file.text.source.name, "the file holds no routine", cure)
+    def cloner(self, sources: Sequence[Source]) -> Cloner:
+        """Parse the files of a job to clone points in them."""
+        return self.clones(self.parse(sources, Start()))

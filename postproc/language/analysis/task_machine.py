@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, all_in_rows
-from postproc.diagnostics import Code
+from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.call_context import CALLED, At, Context
@@ -94,9 +94,26 @@ class Arrived:
         """Forget where the arm is, what moves are made with, and all shared data."""
         return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
 
+    def elsewhere(self) -> Arrived:
+        """Forget where the arm is."""
+        return Arrived(NOWHERE, self.modes, self.points)
+
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
         return self if points is self.points else replace(self, points=points)
+
+    def with_modes(self, modes: Any) -> Arrived:
+        """Return it where moves are made otherwise."""
+        same = modes is self.modes
+        return self if same else Arrived(self.origins, modes, self.points)
+
+    def setting(self, **changed: Any) -> Arrived:
+        """Return it where some modes have other values."""
+        return self.with_modes(self.modes.with_(**changed))
+
+    def blocking(self, why: Reason) -> Arrived:
+        """Return it where targets cannot be compensated from here on, and why."""
+        return self.setting(blocked=self.modes.blocked | {why})
 
 
 NOWHERE = frozenset([ELSEWHERE])
@@ -121,7 +138,6 @@ class TaskMachine(Interpreter[Arrived]):
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
         task: What its names mean.
-        texts: The statements of its files, the main one first.
         start: What the cell says.
         visits: Arrivals by number.
         keys: Context, row and number within the row of each.
@@ -138,8 +154,7 @@ class TaskMachine(Interpreter[Arrived]):
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     task: TaskSymbols[Any] = field(kw_only=True)
-    texts: Sequence[StatementText[Any]]
-    start: Start
+    start: Start = field(kw_only=True)
     visits: list[Any] = field(default_factory=list)
     keys: list[tuple[Context, int, int]] = field(default_factory=list)
     diagnostics: set[Diagnostic] = field(default_factory=set)
@@ -157,9 +172,17 @@ class TaskMachine(Interpreter[Arrived]):
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
+        default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         self.reached = [np.zeros(len(text), dtype=bool) for text in self.texts]
+
+    @cached_property
+    def texts(self) -> Sequence[StatementText[Any]]:
+        """The statements of all files, the main one first."""
+        return [file.text for file in (*self.task.files, *self.task.files_beside)]
 
     # What a language says.
 
@@ -189,17 +212,14 @@ class TaskMachine(Interpreter[Arrived]):
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
 
+    @property
     @abstractmethod
-    def read_visits(
-        self, one: Any, scope: Scope, here: Arrived | None
-    ) -> Iterable[Any]:
-        """Read the visits of a move, nothing for all else.
+    def goals(self) -> Any:
+        """What reads the visits of moves."""
 
-        Args:
-            one: The statement.
-            scope: Where it stands.
-            here: How the arm comes to it, None where that does not count.
-        """
+    @abstractmethod
+    def is_move(self, one: ir.SourceStatement) -> bool:
+        """Return True if a statement moves."""
 
     @abstractmethod
     def places_of(self, one: Any) -> Sequence[int] | None:
@@ -220,6 +240,17 @@ class TaskMachine(Interpreter[Arrived]):
     def inside(self, one: ir.SourceStatement) -> ir.SourceStatement:
         """Return what a statement does: what stands behind its condition, or itself."""
         return one
+
+    def is_asked(self, part: ir.Node) -> bool:
+        """Return True if it counts that a statement asks for something as it runs."""
+        return isinstance(part, ir.FunctionCall)
+
+    def list_asked(self, one: ir.SourceStatement) -> Sequence[Any]:
+        """List what a statement asks for as it runs, of what counts."""
+        if id(one) not in self._asked:
+            found = tuple(filter(self.is_asked, self.task.values_of(one)))
+            self._asked[id(one)] = one, found
+        return self._asked[id(one)][1]
 
     def part_otherwise(
         self, at: At, one: ir.SourceStatement, here: Arrived
@@ -267,7 +298,7 @@ class TaskMachine(Interpreter[Arrived]):
     ) -> Mapping[str, list[tuple[TaskRoutine, int, ir.Instruction]]]:
         """Return all calls of routines of the task, and where they stand."""
         found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
-        for routine in (one for own in self.task.routines.values() for one in own):
+        for routine in self.task.every_routine:
             for row in routine.inside:
                 one = self.inside(self.texts[routine.file].statement(row))
                 if isinstance(one, ir.Instruction):
@@ -290,24 +321,50 @@ class TaskMachine(Interpreter[Arrived]):
         """Allow for other ends of a routine."""
         return here
 
+    def read_visits(
+        self, one: ir.SourceStatement, scope: Scope, here: Arrived | None
+    ) -> Iterable[Any]:
+        """Read the visits of a move, nothing for all else.
+
+        Args:
+            one: The statement.
+            scope: Where it stands.
+            here: How the arm comes to it, None where that does not count.
+        """
+        one = self.inside(one)
+        if not self.is_move(one):
+            return ()
+        modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
+        found: Iterable[Any] = self.goals.visits(one, scope, modes, points)
+        return found
+
     # From statement to statement, see `Interpreter`.
 
     def act(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived | None:
         """Carry out a statement that leads to the next one."""
         if isinstance(one, self.acting):
-            return self.carry_out(at, one, state)
+            after = self.carry_out(at, one, state)
+            return None if after is None or self._went_on(at, after) else after
         state = self.after_functions(at, one, state)
         if type(one) in _PLAIN or isinstance(one, self.passed):
             return self.assign_point(at, one, state)
         return self.part_otherwise(at, one, state)
 
-    def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived] | None:
+    def _went_on(self, at: At, here: Arrived) -> bool:
+        """Tell whether the program has gone on like this behind a move before."""
+        numbers = self._numbers.get(at, ())
+        if not numbers:
+            return False
+        visit, before = self.visits[numbers[-1]], self.visits[numbers[-1]].left
+        visit.left = here.modes, here.points, here.origins.difference(numbers)
+        return bool(visit.left == before)
+
+    def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived | None] | None:
         """Run moves that follow each other; the visit of the first stands for all."""
         behind = self._runs_of(at.context).get(at.row)
         if behind is None:
             return None
         after = self.act(at, at.statement, state)
-        assert after is not None
         (number,) = self._numbers[at]
         self.visits[number].count = behind - at.row
         self.reached[at.place.scope.file][at.row : behind] = True
@@ -369,12 +426,17 @@ class TaskMachine(Interpreter[Arrived]):
         """Find them in the statements of a routine, once for all calls of it."""
         key = place.scope.file, place.flow.first
         if key not in self._runs:
-            text = place.text
-            apart |= rows_of_lines(text, self.task.taught_lines[place.scope.file])
             self._runs[key] = find_runs(
-                text, place.flow, apart, self.places_of, self.is_plain
-            )
+                place.text, place.flow, apart | self._taught_rows[place.scope.file],
+                self.places_of, self.is_plain,
+            )  # fmt: skip
         return self._runs[key]
+
+    @cached_property
+    def _taught_rows(self) -> Sequence[set[int]]:
+        """Statements of every file that stand on lines that are marked as taught."""
+        pairs = zip(self.texts, self.task.taught_lines, strict=False)
+        return [rows_of_lines(text, lines) for text, lines in pairs]
 
     # Calls and moves.
 
@@ -388,7 +450,7 @@ class TaskMachine(Interpreter[Arrived]):
         if said_of_it in ("moves", "sets-frames"):
             self.lost |= here.origins
         if said_of_it == "moves":
-            return replace(here, origins=NOWHERE)
+            return here.elsewhere()
         if said_of_it == "sets-frames":
             return here.forget()
         what = (
@@ -534,7 +596,7 @@ class TaskMachine(Interpreter[Arrived]):
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
         self.visits[known[0]].origins |= here.origins
-        return replace(here, origins=frozenset([known[-1]]))
+        return Arrived(frozenset([known[-1]]), here.modes, here.points)
 
     def _take_again(
         self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]
@@ -736,25 +798,24 @@ def scope_at(at: At, here: Arrived | None = None) -> Scope:
     return scope
 
 
-def follow(make: Callable[[], M]) -> M:
+def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
     """Make a machine and run it.
 
     It runs again where data turn out to change in ways that are not followed.
     Where anything runs beside the program another one reads each move by itself: what
     runs beside may be one of several that were read at once.
     """
-    machine = make()
-    machine.task.volatile = machine.list_changed_beside()
+    machine = kind(task=task, start=start)
+    task.volatile = machine.list_changed_beside()
     machine.run()
     while True:
-        task, changed = machine.task, machine.list_changed_beside()
+        changed = machine.list_changed_beside()
         runs = bool(machine.beside) and any(v.count > 1 for v in machine.visits)
         if changed <= task.volatile and not runs:
             break
         task.volatile |= changed
         at_once = machine.at_once and not machine.beside
-        machine = make()
-        machine.at_once = at_once
+        machine = kind(task=task, start=start, at_once=at_once)
         machine.run()
     machine.settle_points()
     return machine

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import (
     Collection,
     Hashable,
@@ -102,6 +103,9 @@ UNKNOWN_POINT = "its move shifts a point, too, whose numbers are not known or co
 TAUGHT_SHIFT = "a target that is computed from it is marked as taught"
 ANY_ELEMENT = "a move goes to an element of {} that only the run tells"
 ANY_VALUE = "a move goes to {} where only the run tells what it holds"
+ANY_COPY = (
+    "a move goes to {}, which {} is copied to, where only the run tells what it holds"
+)
 BESIDE = (
     "the move in line {} of {} goes there too: how it is reached there is not followed"
 )
@@ -310,15 +314,15 @@ class TaskCollector(ABC):
             own = elements.get(array_of(v.goal.name), "") if by is None else by.pins
             pinned.append(stays.get((file, slots[0]), "") or own)
         uncertain = _find_uncertain({*elements}, self.machine.task.uses.copies)
-        copied = uncertain - elements.keys()
+        copied = uncertain.keys() - elements.keys()
         for v in found:
             unknown = {v.goal.name, array_of(v.goal.name)} & copied
             for point in v.goal.given:
-                unknown |= point.names & uncertain
+                unknown |= point.names & uncertain.keys()
             if unknown:
                 place = v.goal.writes[0], v.goal.writes[1][0]
                 for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
-                    pinned[at] = pinned[at] or ANY_VALUE.format(min(unknown))
+                    pinned[at] = pinned[at] or uncertain[min(unknown)]
             at = index.get(v.goal.point, -1)
             if at >= 0:
                 pinned[at] = pinned[at] or v.goal.pins
@@ -367,17 +371,27 @@ def _aux(found: Sequence[FoundVisit]) -> Floats:
     return aux[:, : int(used.max(initial=-1)) + 1]
 
 
-def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> set[str]:
+def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> Mapping[str, str]:
     """Add what points are made from that moves go to where they are not known.
 
-    >>> sorted(_find_uncertain({"q"}, {("q", "p1"), ("p1", "p0"), ("r", "p2")}))
-    ['p0', 'p1', 'q']
+    Returns:
+        Why each of these names must keep its numbers.
+
+    >>> found = _find_uncertain({"q"}, {("q", "p1"), ("p1", "p0"), ("r", "p2")})
+    >>> sorted(found), found["q"]
+    (['p0', 'p1', 'q'], 'a move goes to q where only the run tells what it holds')
     """
-    found = set[str]()
-    while names - found:
-        found |= names
-        names = {source for target, source in copies if target in found}
-    return found
+    goal = {name: name for name in names}  # what the move goes to, by what it may hold
+    before = -1
+    while before != len(goal):
+        before = len(goal)
+        for target, source in sorted(copies):
+            if target in goal:
+                goal.setdefault(source, goal[target])
+    return {
+        name: ANY_VALUE.format(to) if to == name else ANY_COPY.format(to, name)
+        for name, to in goal.items()
+    }
 
 
 def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
@@ -404,10 +418,12 @@ def _find_marked(
     for file, lines in enumerate(machine.task.taught_lines):
         text = machine.texts[file]
         own = sorted(slot for at, slot in places if at == file) if lines else []
-        rows = {slot: text.row_of(slot) for slot in own}
-        for line in lines:
+        rows, of_row = {slot: text.row_of(slot) for slot in own}, defaultdict(list)
+        for slot in own:
+            of_row[rows[slot]].append(slot)
+        for line in lines if own else ():
             there = _on_line(own, rows, text, line)
-            near = (slot for slot in own if line in text.lines(rows[slot]))
+            near = (slot for row in text.rows_on(line) for slot in of_row[row])
             found |= {(file, slot) for slot in there or near}
     return found
 

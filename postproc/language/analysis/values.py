@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,14 @@ class KnownRecord:
     fields: tuple[tuple[str, Value], ...]
     whole: bool = True
 
+    @cached_property
+    def by_name(self) -> Mapping[str, Value]:
+        """The components by their names."""
+        return dict(self.fields)
+
     def get(self, name: str) -> Value | None:
         """Return a component, None where it is not there."""
-        return next((value for key, value in self.fields if key == name), None)
+        return self.by_name.get(name)
 
     def number(self, name: str) -> float:
         """Return a component that is a number, NaN where it is none."""

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Place
-from postproc.language.analysis.clones import TaskCloner, TaskPoint
+from postproc.language.analysis.clones import TaskCloner
 from postproc.language.analysis.declarations import Datum
 from postproc.language.krl.moves import HOMES
 from postproc.language.krl.program import KrlFile
 from postproc.language.krl.syntax import KrlMove
+from postproc.language.language import NamedPoint
 from postproc.language.text.source import CloneError, Edit, Source, insert_after
 
 POINTS = ("e6pos", "pos", "e6axis", "axis")  # types
@@ -52,7 +53,7 @@ class KrlCloner(TaskCloner):
             raise CloneError("an inline form names its point in its own text")
 
     def declare(
-        self, points: Sequence[TaskPoint], data: Sequence[tuple[int, Datum]], name: str
+        self, points: Sequence[NamedPoint], data: Sequence[tuple[int, Datum]], name: str
     ) -> tuple[int, Edit]:
         """Declare a clone, with all elements of an array, behind the last value."""
         files = {number for number, _ in data}
@@ -72,7 +73,7 @@ class KrlCloner(TaskCloner):
         text = source.newline.decode("latin-1").join(lines)
         return number, insert_after(source, last, text)
 
-    def _head(self, point: TaskPoint, file: KrlFile) -> tuple[str, str]:
+    def _head(self, point: NamedPoint, file: KrlFile) -> tuple[str, str]:
         """Return the type of a point, and the sizes of an array as they are written."""
         name = point.place[3]
         own = [d for d in file.data if d.name == name and d.type and not d.routine]

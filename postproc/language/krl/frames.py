@@ -14,7 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
-from postproc.language.krl import abstract_state, pose_encoding
+from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
 
@@ -124,7 +124,7 @@ class FrameReader:
             return no_frame(_DOUBLE.format(table.upper()))
         found = ZERO if entry <= 0 else self.entry(table, entry)
         first, second = (
-            self._correction(name, *pair) for pair in abstract_state.CORRECTIONS[name]
+            self._correction(name, *pair) for pair in symbols.CORRECTIONS[name]
         )
         return self._product(self._product(first, found), second)
 
@@ -134,7 +134,7 @@ class FrameReader:
         if on is None:
             on = self.task.initial_switch(switch)
         found = self._read_held(frame, frame)
-        if on is False or (on == abstract_state.PERHAPS and found == ZERO):
+        if on is False or (on == symbols.PERHAPS and found == ZERO):
             return ZERO
         shown = name.upper()
         if on is not True:
@@ -156,19 +156,16 @@ class FrameReader:
 
     def _element(self, table: str, number: int) -> KrlFrame | None:
         """Read an element of an array of frames, None where it is not known."""
-        held = self._read_held(table, abstract_state.entry_name(table, number))
+        held = self._read_held(table, symbols.entry_name(table, number))
         if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):
             return None
         found = self.task.datum(table, self.here, (number,))
-        if found is None or found[1].value is None:
+        pose = pose_of(self.task.entry(table, number, self.here))
+        if found is None or not pose:
             return None
-        file, datum = found
-        there = Scope(file, self.task.files[file].name, "", row=datum.row)
-        pose = pose_of(self.task.value(datum.value, there))
-        taught = self.task.is_taught(table, file, datum.row)
-        return KrlFrame(pose, taught=taught) if pose else None
+        return KrlFrame(pose, taught=self.task.is_taught(table, found[0], found[1].row))
 
     def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
@@ -178,16 +175,11 @@ class FrameReader:
         """Tell whether a base hangs on an external axis, or may be hung on one."""
         if "machine_frame_dat" in self.task.written:
             return True
-        found = self.task.datum("machine_frame_dat", self.here, (number,))
-        if found is None:
+        if self.task.datum("machine_frame_dat", self.here, (number,)) is None:
             return False
-        file, datum = found
-        there = Scope(file, self.task.files[file].name, "", row=datum.row)
-        value = self.task.value(datum.value, there)
-        known = (
-            value.number("mach_def_index") if isinstance(value, KnownRecord) else 1.0
-        )
-        return not known == 0.0
+        value = self.task.entry("machine_frame_dat", number, self.here)
+        free = isinstance(value, KnownRecord) and value.number("mach_def_index") == 0.0
+        return not free
 
     def _unknown(self, shown: str, name: str) -> Reason:
         code, text = self.task.explain_unknown(name, self.here)

@@ -10,15 +10,14 @@ from functools import cached_property
 
 from postproc.arrays import Floats
 from postproc.language import insert_moves, ir
+from postproc.language.analysis.insert_moves import TaskSplitter
 from postproc.language.krl import syntax as said
 from postproc.language.krl.clones import is_of_form
 from postproc.language.krl.modal_state import PLANNED
 from postproc.language.krl.pose_encoding import COMPONENTS, KRL_DIALECT
-from postproc.language.krl.program import KrlFile
-from postproc.language.text.source import CloneError, Span
+from postproc.language.text.source import CloneError, Source, Span
 
 LINES = {"lin": "LIN", "circ": "LIN", "slin": "SLIN", "scirc": "SLIN"}
-_HEAD = re.compile(r"\s*(S?LIN|S?CIRC)\b", re.I)
 _BLENDING = re.compile(r"(?:\s*\bC_\w+)+\s*$", re.I)
 _WITH = re.compile(r"\bWITH\b", re.I)
 _ACTUAL = re.compile(rb"\$(?:POS|AXIS)_(?:BACK|FOR|RET)\b|\$DIST_NEXT\b", re.I)
@@ -28,48 +27,39 @@ _STOPPED = "ir_stopm"  # the controller's own, in every program of an inline for
 _Row = tuple[int, int]  # a file, and a statement of it
 
 
-@dataclass(frozen=True)
-class KrlSplitter(insert_moves.Splitter):
-    """The files of a job, to put points on the ways of moves.
+class KrlSplitter(TaskSplitter):
+    """The files of a job, to put points on the ways of moves."""
 
-    Attributes:
-        files: The files.
-    """
-
-    files: tuple[KrlFile, ...]
+    head = re.compile(r"\s*(S?LIN|S?CIRC)\b", re.I)
     unsized: str = (
         "points on its way would be passed at a distance that is not known: set "
         "$APO.CDIS before it"
     )
     keeps_aux: bool = True
 
-    def hinders(self, file: int, line: int) -> str:
-        """Say why a move must stay in one piece, see `Splitter.hinders`."""
-        own = self.files[file]
+    def list_problems(self, file: int, line: int) -> Iterator[tuple[str, object]]:
+        """Yield what may forbid points on a way, see `Splitter.list_problems`."""
+        own = self.task.files[file]
         row = own.find_move(line)
         move = own.text.statement(row)
         if not isinstance(move, said.KrlMove):
-            return "it does not stand alone on its line"
-        for problem, hinders in (
-            (self._beside, bool(self._beside)),
-            ("it stands in a file of the controller, which is not rewritten",
-             own.is_system),
-            ("it stands in a spline block, whose curve depends on all of its points",
-             any(row in rows for rows in own.splines)),
-            ("it is neither a line nor an arc to a place", move.word not in LINES),
-            ("it ends at an angle (CA)", move.angle is not None),
-            ("a TRIGGER belongs to it, or to a move beside it",
-             self._triggered is None or (file, row) in self._triggered),
-            ("an inline form would drop the points when it is edited",
-             is_of_form(own.text.source, line)),
-        ):  # fmt: skip
-            if hinders:
-                return problem
-        return ""
+            yield "it does not stand alone on its line", True
+            return
+        yield self._beside, self._beside
+        system = "it stands in a file of the controller, which is not rewritten"
+        yield system, own.is_system
+        curve = "it stands in a spline block, whose curve depends on all of its points"
+        yield curve, any(row in rows for rows in own.splines)
+        yield "it is neither a line nor an arc to a place", move.word not in LINES
+        yield "it ends at an angle (CA)", move.angle is not None
+        triggered = self._triggered is None or (file, row) in self._triggered
+        yield "a TRIGGER belongs to it, or to a move beside it", triggered
+        in_form = is_of_form(own.text.source, line)
+        yield "an inline form would drop the points when it is edited", in_form
 
     def _statements(self) -> Iterator[ir.SourceStatement]:
         """Yield the statements of the user's files, one of each form."""
-        for file in self.files:
+        for file in self.task.files:
             if not file.is_system:
                 yield from file.text.said
 
@@ -79,7 +69,7 @@ class KrlSplitter(insert_moves.Splitter):
         own = [*self._statements()]
         if any(isinstance(one, said.ContinueWord) for one in own):
             return "the program runs ahead of its moves (CONTINUE)"
-        texts = [one.text.source.data for one in self.files if not one.is_system]
+        texts = [one.text.source.data for one in self.task.files if not one.is_system]
         if any(map(_ACTUAL.search, texts)):
             return "the program reads where the move under way begins or ends"
         watched = any(
@@ -95,58 +85,45 @@ class KrlSplitter(insert_moves.Splitter):
     def _triggered(self) -> frozenset[_Row] | None:
         """Return moves with triggers, and those beside them; None for all moves."""
         found = set[_Row]()
-        for number, file in enumerate(self.files):
+        for number, file in enumerate(self.task.files):
             moves, text = file.moves.tolist(), file.text
             for row in text.where(lambda one: isinstance(one, said.PathTrigger)):
                 at = bisect(moves, row)
                 if at == len(moves) or not all(
                     isinstance(text.statement(k), said.PathTrigger | said.SplineBlock)
-                    or _is_setting(text.statement(k))
+                    or self.is_setting(text.statement(k))
                     for k in range(row, moves[at])
                 ):
                     return None  # which move it belongs to does not show
                 found |= {(number, k) for k in moves[max(at - 1, 0) : at + 2]}
         return frozenset(found)
 
-    def stops(self, file: int, line: int) -> bool:
-        """Return True if the arm may stop once more, see `Splitter.stops`."""
-        own = self.files[file]
-        for one in map(own.text.statement, range(own.find_move(line) - 1, -1, -1)):
-            if not _is_setting(one):
-                return isinstance(one, said.KrlMove)
-        return False
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True if a statement sets how moves are made, and does nothing else."""
+        if isinstance(one, ir.Assignment):
+            return one.target.name in PLANNED or one.target.name in _ACTIVE
+        if not isinstance(one, ir.Instruction) or one.name != "bas":
+            return False
+        command = one.arguments[0].value if one.arguments else None
+        word = command.name if isinstance(command, said.EnumValue) else "#out_"
+        return not word.startswith("#out_")
 
-    def layout(self, file: int, line: int) -> KrlLayout:
-        """Look at a move, see `Splitter.layout`."""
-        text = self.files[file].text
-        source, (_, end) = text.source, text.span(self.files[file].find_move(line))
-        start = int(source.line_starts[line - 1])
-        code = source.text[start:end].rstrip()
-        head = _HEAD.match(code)
-        if head is None:
-            raise CloneError("the move is not understood")
+    def is_plain_move(self, one: ir.SourceStatement) -> bool:
+        """Return True for every move."""
+        return isinstance(one, said.KrlMove)
+
+    def lay_out(
+        self, source: Source, start: int, code: str, head: re.Match[str]
+    ) -> KrlLayout:
+        """Look at a move, see `TaskSplitter.lay_out`."""
         blending = _BLENDING.search(code)
         stop = blending.start() if blending else len(code)
         with_ = _WITH.search(code, head.end(), stop)
         behind = with_.start() if with_ else stop
-        skip = head.end()
-        ends = [
-            Span(a + skip, b + skip)
-            for a, b in insert_moves.split_arguments(code[skip:behind])
-        ]
+        first, *_ = insert_moves.split_arguments(code, head.end(), behind)
         settings = code[with_.end() : stop].strip() if with_ else ""
         indent, word = code[: head.start(1)], head[1].lower()
-        return KrlLayout(source, start, code, indent, ";", word, ends[0], settings)
-
-
-def _is_setting(one: ir.SourceStatement) -> bool:
-    """Return True if a statement sets how moves are made, and does nothing else."""
-    if isinstance(one, ir.Assignment):
-        return one.target.name in PLANNED or one.target.name in _ACTIVE
-    if not isinstance(one, ir.Instruction) or one.name != "bas":
-        return False
-    command = one.arguments[0].value if one.arguments else None
-    return isinstance(command, said.EnumValue) and not command.name.startswith("#out_")
+        return KrlLayout(source, start, code, indent, ";", word, first, settings)
 
 
 @dataclass(frozen=True)

@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import NO_POINTS, Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
     MOVES,
-    NOWHERE,
     Arrived,
     Effects,
     TaskMachine,
     scope_at,
 )
 from postproc.language.krl import syntax as said
-from postproc.language.krl.abstract_state import HELD
 from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modal_state import (
     HALTING,
@@ -33,18 +31,17 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals, KrlVisit, own_numbers
+from postproc.language.krl.moves import KrlGoals, own_numbers
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
     FUNCTIONS,
+    HELD,
     STILL,
     KrlTask,
     list_calls,
     package_routines,
-    values_of,
 )
-from postproc.language.language import Start
 from postproc.language.visits import START
 
 _INTERRUPT = Reason(
@@ -87,7 +84,6 @@ class KrlMachine(TaskMachine):
 
     Attributes:
         task: Its files.
-        goals: Reads destinations.
     """
 
     procedures = ("def",)
@@ -100,18 +96,15 @@ class KrlMachine(TaskMachine):
         said.InterruptDeclared,
     )  # fmt: skip
     task: KrlTask = field(kw_only=True)
-    goals: KrlGoals = field(kw_only=True)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
     _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
 
-    @classmethod
-    def of(cls, task: KrlTask, start: Start) -> KrlMachine:
-        """Get ready to follow a job."""
-        texts = [file.text for file in task.files]
-        goals = KrlGoals(task, frozenset(start.aux))
-        return cls(texts, start, task=task, goals=goals)
+    @cached_property
+    def goals(self) -> KrlGoals:
+        """What reads destinations."""
+        return KrlGoals(self.task, frozenset(self.start.aux))
 
     def run(self) -> None:
         """Follow every way from the first routine."""
@@ -127,6 +120,10 @@ class KrlMachine(TaskMachine):
             self.say(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
 
     # What a statement is.
+
+    def is_move(self, one: ir.SourceStatement) -> bool:
+        """Return True for moves."""
+        return isinstance(one, said.KrlMove)
 
     def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
@@ -196,7 +193,7 @@ class KrlMachine(TaskMachine):
         """
         if not here.modes.perhaps:
             return self._run_once(at, one, here)
-        here = replace(here, modes=here.modes.with_(perhaps=False))
+        here = here.setting(perhaps=False)
         after = self._run_once(at, one, here)
         if after is None:
             self.go_on(at.behind, here)
@@ -211,9 +208,8 @@ class KrlMachine(TaskMachine):
         here = self._forget(at, one, here)
         match one:
             case said.KrlMove():
-                here = self.arrive(at, one, here)
-                modes = replace(here.modes, halted=False, goes_on=False)
-                return replace(here, modes=modes)
+                after = self.arrive(at, one, here)
+                return after.setting(halted=False, goes_on=False)
             case ir.Assignment():
                 return self._assign(at, one, here)
             case ir.Instruction():
@@ -221,7 +217,7 @@ class KrlMachine(TaskMachine):
             case said.Waiting():
                 return _halt(here, True)
             case said.ContinueWord():
-                return replace(here, modes=replace(here.modes, goes_on=True))
+                return here.setting(goes_on=True)
             case said.InterruptDeclared():
                 return self._declare(at, one, here)
             case said.InterruptSwitched():
@@ -235,6 +231,8 @@ class KrlMachine(TaskMachine):
         """Forget what a routine may change of what is handed over to it."""
         if isinstance(one, said.InterruptDeclared | said.PathTrigger):
             return here
+        if isinstance(one, said.KrlMove) and not self.list_asked(one):
+            return here
         own = one.target if isinstance(one, ir.Assignment) else None
         modes = here.modes
         for target in self.task.list_changes(one):
@@ -245,7 +243,7 @@ class KrlMachine(TaskMachine):
                 what = f"hands {name.upper()} over, which may be changed"
                 return self.unknown(at, here, what)
             modes = modes.drop(name)
-        return here if modes is here.modes else replace(here, modes=modes)
+        return here.with_modes(modes)
 
     def _modes(self, at: At) -> ModeReader:
         return ModeReader(self.task, scope_at(at))
@@ -265,9 +263,8 @@ class KrlMachine(TaskMachine):
         value = one.value
         if isinstance(value, ir.FunctionCall) and value.name in ("eb", "eb_abs"):
             # The base follows a conveyor, which takes the arm along.
-            here = replace(here, origins=NOWHERE)
-        here = self.assign_point(at, one, here)
-        return replace(here, modes=modes)
+            here = here.elsewhere()
+        return self.assign_point(at, one, here).with_modes(modes)
 
     def _call(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived | None:
         name = one.name
@@ -277,12 +274,11 @@ class KrlMachine(TaskMachine):
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
                 here = _halt(here, None)  # outputs are switched, which may stop the arm
-            modes = self._modes(at).bas(here.modes, one.arguments)
-            return replace(here, modes=modes)
+            return here.with_modes(self._modes(at).bas(here.modes, one.arguments))
         if name == "pulse":
             return _halt(here, True)
         if name == "on_error_proceed":
-            return replace(here, modes=here.modes.with_(perhaps=True))
+            return here.setting(perhaps=True)
         if name in STILL or self.declares_motionless(name):
             return _halt(here, None)
         if name in package_routines() and not self._is_overruled(name):
@@ -301,16 +297,21 @@ class KrlMachine(TaskMachine):
         self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what a statement reads, and for what its functions do."""
-        for part in values_of(one):
+        for part in self.list_asked(one):
             if isinstance(part, ir.FunctionCall):
                 here = self._function(at, part.name, here)
-            elif isinstance(part, ir.DataObject) and part.name.startswith("$"):
+            else:
                 given = isinstance(one, ir.Assignment) and part is one.target
                 known = part.name in PLANNED or isinstance(one, said.KrlMove)
                 if given or (known and part.name not in HALTING):
                     continue
                 here = _halt(here, True if part.name in HALTING else None)
         return here
+
+    def is_asked(self, part: ir.Node) -> bool:
+        """Return True for functions and system variables."""
+        system = isinstance(part, ir.DataObject) and part.name.startswith("$")
+        return system or super().is_asked(part)
 
     def _function(self, at: At, name: str, here: Arrived) -> Arrived:
         """Allow for what a function does."""
@@ -326,21 +327,20 @@ class KrlMachine(TaskMachine):
         self._met.add((at.place.scope.file, at.row))
         effects = self.effects_of(one.action, at.place.scope)
         self._call_beside(one.action)
-        modes, number = here.modes, self._number_of(scope_at(at), one.number)
-        others = frozenset(d for d in modes.declared if d[0] != number)
-        modes = replace(modes, declared=others)
-        ends = RESUMES in effects
+        number = self._number_of(scope_at(at), one.number)
+        others = frozenset(d for d in here.modes.declared if d[0] != number)
+        here, ends = here.setting(declared=others), RESUMES in effects
         if ends and (MOVES in effects or not self._ends_routines(number)):
             self._begin_early(_RESUMED, here)
-            return replace(here, modes=modes.with_(blocked=modes.blocked | {_RESUMED}))
+            return here.blocking(_RESUMED)
         if effects:
             moves = _INTERRUPT if MOVES in effects else _RESUMED
             own = number, _ENDED if ends else moves
-            modes = replace(modes, declared=others | {own})
+            here = here.setting(declared=others | {own})
             if not self._find_routines(("on",), {number, EVERY}):  # nothing does
                 self._begin_early(own[1], here)
-                modes = replace(modes, active=modes.active | {own})
-        return replace(here, modes=modes)
+                here = here.setting(active=here.modes.active | {own})
+        return here
 
     # RESUME ends all routines that have been called where its interrupt is declared,
     # and the program goes on behind the call, wherever the arm is.
@@ -394,7 +394,7 @@ class KrlMachine(TaskMachine):
         ended = here.forget()
         on = {own for own in ending if own[0] in self._still_enabled}
         left = (ended.modes.active - ending) | on
-        return here.join(replace(ended, modes=ended.modes.with_(active=left)))
+        return here.join(ended.setting(active=left))
 
     @cached_property
     def _still_enabled(self) -> set[int]:
@@ -428,13 +428,13 @@ class KrlMachine(TaskMachine):
             }
             for _, why in meant:
                 self._begin_early(why, here)
-            return replace(here, modes=replace(modes, active=modes.active | meant))
+            return here.setting(active=modes.active | meant)
         if one.word != "off" or (one.number is not None and number == EVERY):
             return here
         left = {d for d in modes.active if one.number is not None and d[0] != number}
         if left == modes.active:
             return here
-        return replace(here, modes=replace(modes, active=frozenset(left))).forget()
+        return here.setting(active=frozenset(left)).forget()
 
     def _begin_early(self, why: Reason, here: Arrived) -> None:
         """Note that an interrupt may come in moves before it is switched on.
@@ -474,9 +474,7 @@ class KrlMachine(TaskMachine):
         if not self.effects_of(one.action, at.place.scope):
             return here
         self._call_beside(one.action)
-        return replace(
-            here, modes=here.modes.with_(blocked=here.modes.blocked | {_INTERRUPT})
-        )
+        return here.blocking(_INTERRUPT)
 
     def _call_beside(self, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""
@@ -492,14 +490,6 @@ class KrlMachine(TaskMachine):
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement says what is done at another time."""
         return isinstance(one, said.InterruptDeclared | said.PathTrigger)
-
-    def read_visits(
-        self, one: Any, scope: Scope, here: Arrived | None
-    ) -> Iterator[KrlVisit]:
-        """Read the visits of a move, see `TaskMachine.read_visits`."""
-        if isinstance(one, said.KrlMove):
-            modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
-            yield from self.goals.visits(one, scope, modes, points)
 
     @cached_property
     def everywhere(self) -> frozenset[Reason]:
@@ -539,7 +529,9 @@ class KrlMachine(TaskMachine):
     def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield functions and the instruction; of a trigger what it does."""
         parts = (
-            ir.walk(one.action) if isinstance(one, said.PathTrigger) else values_of(one)
+            ir.walk(one.action)
+            if isinstance(one, said.PathTrigger)
+            else self.task.values_of(one)
         )
         calls = ir.Instruction | ir.FunctionCall
         yield from (part.name for part in parts if isinstance(part, calls))
@@ -564,9 +556,6 @@ def _frame(record: tuple[float, ...] | None) -> KrlFrame:
 
 def _halt(here: Arrived, halted: bool | None) -> Arrived:
     """Say that the arm stops before it goes on, or that it may (None)."""
-    modes = here.modes
-    if modes.goes_on:
-        return replace(here, modes=replace(modes, goes_on=False))
-    if modes.halted or modes.halted == halted:
-        return here
-    return replace(here, modes=replace(modes, halted=halted))
+    if here.modes.goes_on:
+        return here.setting(goes_on=False)
+    return here if here.modes.halted else here.setting(halted=halted)

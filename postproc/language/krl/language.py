@@ -9,8 +9,7 @@ from pathlib import Path
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
 from postproc.language import ir, language
-from postproc.language.analysis.task_language import TaskLanguage, check_routines
-from postproc.language.analysis.task_machine import follow
+from postproc.language.analysis.task_language import TaskLanguage
 from postproc.language.insert_moves import Splitter
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
@@ -23,7 +22,6 @@ from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import KrlCollector
 from postproc.language.krl.user_sources import acting_sources
 from postproc.language.measuring_program import MeasuringProgram, refuse_other_name
-from postproc.language.text.blocks import read_once
 from postproc.language.text.source import Source
 
 # Switches of the controller's own accuracy model, and the words that switch it off.
@@ -44,6 +42,12 @@ class Krl(TaskLanguage):
     comment = ";"
     dialect = KRL_DIALECT
     grammar = "krl"
+    cure = "Give the .src of a program"
+    read_file = staticmethod(read_krl)
+    task = KrlTask
+    machine = KrlMachine
+    collector = KrlCollector
+    clones = KrlCloner
     begins = re.compile(
         rb"(?:\xef\xbb\xbf)?(?:\s|;[^\r\n]*[\r\n])*(?:&\w|(?:GLOBAL\s+)?DEF\s)", re.I
     )
@@ -59,36 +63,24 @@ class Krl(TaskLanguage):
     )
     names_numbers = True
 
-    def read(
-        self,
-        sources: Sequence[Source],
-        start: language.Start,
-        known: Sequence[KrlFile] = (),
-    ) -> language.JobReading:
-        """Read the files of a job, the source that runs first; see `Language.read`."""
-        files = [read_once(source, known, read_krl) for source in sources]
+    def name_main(self, files: Sequence[KrlFile]) -> tuple[str, str]:
+        """Name the first routine, and what a file is called."""
+        return f"DEF {files[0].routines[0].head.name}", "program"
+
+    def refuse(self, files: Sequence[KrlFile]) -> None:
+        """Refuse submit programs, the controller's own accuracy and second values."""
         if files[0].is_submit:
             problem = "is a submit program, which moves no arm"
-            raise ProgramError(sources[0].name, problem, "Give the .src of a program")
-        check_routines(files[0], "Give the .src of a program")
+            name = files[0].text.source.name
+            raise ProgramError(name, problem, "Give the .src of a program")
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
-        task = KrlTask(files, start.taught)
-        machine = follow(lambda: KrlMachine.of(task, start))
-        visits = KrlCollector(machine).collect()
-        odd = (d for file in files for d in file.diagnostics)
-        main = f"DEF {files[0].routines[0].head.name}", "program"
-        return self.report(machine, visits, files, odd, main)
-
-    def cloner(self, sources: Sequence[Source]) -> language.Cloner:
-        """Parse the files of a job to clone points of its data lists."""
-        return KrlCloner(KrlTask([read_krl(source) for source in sources]))
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the files of a job to put points on the ways of its moves."""
         from postproc.language.krl.insert_moves import KrlSplitter
 
-        return KrlSplitter(tuple(read_krl(source) for source in sources))
+        return KrlSplitter(self.parse(sources, language.Start()))
 
     def reads(
         self,

@@ -14,7 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.modal_state import ModalState
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value
-from postproc.language.krl import abstract_state
+from postproc.language.krl import symbols
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import (
     NUMBERS,
@@ -138,8 +138,8 @@ _LAWS = {
 }
 _BOOLS = ("true", "false")
 _SWITCHED_OFF: Sequence[tuple[str, object]] = (
-    *((name, False) for name in sorted(abstract_state.SWITCHES)),
-    *((name, ZERO) for name in sorted(abstract_state.CORRECTION_FRAMES)),
+    *((name, False) for name in sorted(symbols.SWITCHES)),
+    *((name, ZERO) for name in sorted(symbols.CORRECTION_FRAMES)),
 )
 _KEPT_ON = "tool_corr_on"  # old controllers take the frame back, but not the switch
 BAS_HARMLESS = frozenset("#acc_ptp #acc_cp #acc_glue #out_sync #out_async".split())
@@ -284,24 +284,24 @@ class ModeReader:
             case _ if name in _BLOCKING:
                 return modes.with_(blocked=modes.blocked | {_BLOCKING[name]})
             case "$circ_mode":
-                return replace(modes, through=self._goes_through(one))
+                return modes.with_(through=self._goes_through(one))
             case "$vel" | "$vel_axis" | "$apo":
                 return self._speed(modes, one)
             case "$advance":
                 number = self._number(value)
                 ahead = None if math.isnan(number) else number > 0
-                return replace(modes, ahead=ahead)
+                return modes.with_(ahead=ahead)
             case "$load":
                 return self._load(modes, one)
             case "$ex_ax_ignore":
                 off = self._number(value) == 0.0
                 rest = modes.blocked - {IGNORED}
-                return replace(modes, blocked=rest if off else rest | {IGNORED})
+                return modes.with_(blocked=rest if off else rest | {IGNORED})
             case "fdat_act" | "pdat_act" | "ldat_act":
                 return self._hold_component(modes, one)
-            case _ if name in abstract_state.TABLES:
+            case _ if name in symbols.TABLES:
                 return self._entry(modes, one)
-            case _ if name in abstract_state.HELD:
+            case _ if name in symbols.HELD:
                 return self._correction(modes, one)
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
@@ -329,7 +329,7 @@ class ModeReader:
             index = self.task.index(one.target.steps[0], self.here)
         if index is None or len(index) != 1:
             return modes.drop(table)
-        key, parts = abstract_state.entry_name(table, index[0]), one.target.steps[1:]
+        key, parts = symbols.entry_name(table, index[0]), one.target.steps[1:]
         value: object | None = None
         if not self.task.is_global(table, self.here):
             return modes.hold(key, value)
@@ -362,7 +362,7 @@ class ModeReader:
         name, value = one.target.name, None
         if one.target.steps or not self.task.is_global(name, self.here):
             return modes.hold(name, None)
-        if name in abstract_state.SWITCHES:
+        if name in symbols.SWITCHES:
             value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
             return modes.hold(name, value)
         found = self.frames(modes).frame(one.value)
@@ -416,12 +416,12 @@ class ModeReader:
         number = number_or_unknown(self._number(one.value))
         match name, step:
             case "$vel", "cp":
-                return replace(modes, speed=number)
+                return modes.with_(speed=number)
             case "$vel", "":
                 speed = self._record(one.value).number("cp")
                 if isinstance(one.value, ir.FunctionCall):  # SVEL_CP(2, , LCPDAT1)
                     speed = self._number(self._argument(one.value))
-                return replace(modes, speed=number_or_unknown(speed))
+                return modes.with_(speed=number_or_unknown(speed))
             case "$vel_axis", ir.ElementStep():
                 inside = self._argument(one.value)
                 percent = (
@@ -429,11 +429,11 @@ class ModeReader:
                     if inside is None
                     else number_or_unknown(self._number(inside))
                 )
-                return replace(modes, share=percent / 100.0 if percent > 0 else UNKNOWN)
+                return modes.with_(share=percent / 100.0 if percent > 0 else UNKNOWN)
             case "$apo", "cdis":
-                return replace(modes, distance=number)
+                return modes.with_(distance=number)
             case "$apo", "cptp":
-                return replace(modes, overlap=number)
+                return modes.with_(overlap=number)
             case "$apo", "":
                 return self._blending(modes, one.value)
         return modes
@@ -442,10 +442,9 @@ class ModeReader:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
         if isinstance(operand, ir.FunctionCall):
             held = self._record(self._argument(operand))
-            return replace(modes, distance=number_or_unknown(held.number("apo_dist")))
+            return modes.with_(distance=number_or_unknown(held.number("apo_dist")))
         found = self._record(operand)
-        return replace(
-            modes,
+        return modes.with_(
             distance=number_or_unknown(found.number("cdis")),
             overlap=number_or_unknown(found.number("cptp")),
         )
@@ -456,41 +455,38 @@ class ModeReader:
         match one.target.steps, operand:
             case ("m",), _:
                 mass, centre = self._number(operand), modes.load[1:]
-                return replace(modes, load=_load_of(mass, centre))
+                return modes.with_(load=_load_of(mass, centre))
             case ("cm",), _:
                 centre = _centre_of(self._record(operand))
                 known = centre and modes.load and modes.load != LOST_LOAD
                 load = (modes.load[0], *centre) if known else LOST_LOAD
-                return replace(modes, load=load)
+                return modes.with_(load=load)
             case ("cm", *_), _:
-                return replace(modes, load=LOST_LOAD)
+                return modes.with_(load=LOST_LOAD)
             case (), ir.FunctionCall(name="sload"):
                 return self.take_load(modes, self._number(self._argument(operand)))
             case (), ir.DataObject(name="load_data", steps=(ir.ElementStep() as step,)):
                 index = self.task.index(step, self.here) or (math.nan,)
                 return self.take_load(modes, index[0])
             case (), _:
-                return replace(modes, load=load_of(self._record(operand)))
+                return modes.with_(load=load_of(self._record(operand)))
         return modes
 
     def take_load(self, modes: KrlModes, number: float) -> KrlModes:
         """Take the load of a tool's number, as BAS and SLOAD do."""
         entry = whole(number)
         if entry is None:
-            return replace(modes, load=LOST_LOAD)
-        held = modes.store.get(abstract_state.entry_name("load_data", entry))
+            return modes.with_(load=LOST_LOAD)
+        held = modes.store.get(symbols.entry_name("load_data", entry))
         if isinstance(held, tuple) and "load_data" not in self.task.beside:
-            return replace(modes, load=held)
+            return modes.with_(load=held)
         if not self.task.is_steady("load_data", entry):
-            return replace(modes, load=LOST_LOAD)
-        found = self.task.datum("load_data", self.here, (entry,))
-        if entry <= 0 or found is None:
-            return replace(modes, load=CELL_LOAD)
-        file, datum = found
-        there = Scope(file, self.task.files[file].name, "", row=datum.row)
-        value = self.task.value(datum.value, there)
+            return modes.with_(load=LOST_LOAD)
+        if entry <= 0 or self.task.datum("load_data", self.here, (entry,)) is None:
+            return modes.with_(load=CELL_LOAD)
+        value = self.task.entry("load_data", entry, self.here)
         load = load_of(value) if isinstance(value, KnownRecord) else LOST_LOAD
-        return replace(modes, load=load)
+        return modes.with_(load=load)
 
     # BAS(#command, value), as the controller's bas.src carries it out.
 
@@ -514,19 +510,19 @@ class ModeReader:
                 modes = self.take_load(modes, value) if word == "#tool" else modes
                 return modes.with_(**{word[1:]: found})
             case "#vel_ptp":
-                return replace(modes, share=_share(value))
+                return modes.with_(share=_share(value))
             case "#vel_cp":
-                return replace(modes, speed=number_or_unknown(value))
+                return modes.with_(speed=number_or_unknown(value))
             case "#ptp_dat":
                 return self._joint_data(modes)
             case "#cp_dat":
                 return self._path_data(modes)
             case "#ptp_params":
                 changed = self._frames(self._joint_data(modes))
-                return replace(changed, share=_share(value))
+                return changed.with_(share=_share(value))
             case "#cp_params":
                 changed = self._frames(self._path_data(modes))
-                return replace(changed, speed=number_or_unknown(value))
+                return changed.with_(speed=number_or_unknown(value))
         return modes if word in BAS_HARMLESS else modes.forget()
 
     def _initial(self, modes: KrlModes) -> KrlModes:
@@ -534,18 +530,17 @@ class ModeReader:
 
         Speeds and distances are those of ``$config.dat``. The load stays what it is.
         """
-        linked = modes.store.get(_KEPT_ON) in (True, abstract_state.PERHAPS)
+        linked = modes.store.get(_KEPT_ON) in (True, symbols.PERHAPS)
         for name, value in _SWITCHED_OFF:
             modes = modes.hold(name, value)
-        modes = modes.hold(_KEPT_ON, abstract_state.PERHAPS) if linked else modes
+        modes = modes.hold(_KEPT_ON, symbols.PERHAPS) if linked else modes
         reader = self.frames(modes)
 
         def number(name: str) -> float:
             return self._number(ir.DataObject(name))
 
         advance = number("def_advance")
-        return replace(
-            modes,
+        return modes.with_(
             tool=reader.entry("tool_data", 1),
             base=reader.read_numbered("$base", 0),
             interpolation="#base",
@@ -584,8 +579,8 @@ class ModeReader:
         held = modes.pdat if isinstance(modes.pdat, KnownRecord) else KnownRecord(())
         size = number_or_unknown(held.number("apo_dist"))
         if held.get("apo_mode") == "#cdis":
-            return replace(modes, distance=size, overlap=UNKNOWN)
-        return replace(modes, overlap=size)
+            return modes.with_(distance=size, overlap=UNKNOWN)
+        return modes.with_(overlap=size)
 
     def _path_data(self, modes: KrlModes) -> KrlModes:
         """Take blending and orientation of LDAT_ACT."""
@@ -594,8 +589,7 @@ class ModeReader:
         word, circle = held.get("ori_typ"), held.get("circ_typ")
         if held.whole and circle is None:  # which may be left out
             circle = self._default_circle
-        return replace(
-            modes,
+        return modes.with_(
             distance=number_or_unknown(held.number("apo_dist")),
             orientation=word if isinstance(word, str) else "",
             circle=circle if isinstance(circle, str) else "",

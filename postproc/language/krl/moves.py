@@ -127,7 +127,8 @@ class KrlGoals:
             goal = not_reached(self._reader(move, here).end(move.to), SPLINE)
             yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
             return
-        reader = self._reader(move, replace(here, points=points))
+        there = replace(here, points=points) if points.routines else here
+        reader = self._reader(move, there)
         angle = math.radians(self.task.number(move.angle, here))
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
@@ -236,11 +237,11 @@ class KrlGoal(goals.GoalReader):
         """Read joint angles or a position."""
         if not isinstance(value, KnownRecord) or not value.whole:
             return None
-        by_axes = {key for key, _ in value.fields} & set(symbols.AXES)
+        by_axes = not value.by_name.keys().isdisjoint(symbols.AXES)
         goal = self._axes(value) if by_axes else self._pose(value)
         if name and goal.why.code is Code.PARTIAL_TARGET:
-            return self.unknown(PARTIAL, name)  # what it lacks may be told elsewhere
-        return replace(goal, name=name)
+            return self.unknown(PARTIAL)  # what it lacks may be told elsewhere
+        return goal
 
     def is_shared(self, name: str) -> bool:
         """Return True for GLOBAL data."""

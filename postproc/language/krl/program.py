@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from postproc import _native
 from postproc.files import base_name
 from postproc.language import ir
@@ -74,7 +76,8 @@ def read_krl(source: Source) -> KrlFile:
     text = read_text(source, _native.scan_krl, parse_statement)
     name = base_name(source.name)
     outline, splines, begin = Outline(text, _WORDS), list[range](), -1
-    for row in text.where(lambda one: not isinstance(one, said.KrlMove)):
+    moves = text.of_kind(lambda one: isinstance(one, said.KrlMove))
+    for row in text.of_kind(lambda one: not isinstance(one, said.KrlMove)):
         match one := text.statement(row):
             case said.DataList():
                 outline.begin("defdat", row, one)
@@ -97,12 +100,11 @@ def read_krl(source: Source) -> KrlFile:
     if routines:  # other files know the first one of a file
         head = replace(routines[0].head, local=False)
         routines[0] = replace(routines[0], head=head)
-    moves = text.find_rows(lambda one: isinstance(one, said.KrlMove))
     return KrlFile(
         text,
         tuple(routines),
         tuple(outline.data),
-        moves,
+        np.array(moves, dtype=np.int32),
         tuple(sorted({*outline.diagnostics})),
         name,
         tuple(splines),

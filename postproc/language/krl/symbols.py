@@ -20,7 +20,6 @@ from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
-from postproc.language.krl.abstract_state import TABLES
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.shifts import Shift, ShiftKind
@@ -49,6 +48,27 @@ FIELDS: Mapping[str, Layout] = {
 }
 """Components of points by type."""
 WHOLE_NUMBERS = COMPONENTS[6:]
+
+# What a program sets on its way: entries of tables, corrections, switches.
+
+TABLES = ("tool_data", "base_data", "load_data")
+"""Arrays that $TOOL, $BASE and $LOAD are read from."""
+CORRECTIONS: Mapping[str, tuple[tuple[str, str], tuple[str, str]]] = {
+    "$tool": (("tool_corr_w", "tool_corr_w_on"), ("tool_corr", "tool_corr_on")),
+    "$base": (("base_corr", "base_corr_on"), ("m_base_corr", "m_bas_cor_on")),
+}
+"""Frames that BAS links to an entry, in front of it and behind it, and their switches.
+
+``BAS(#TOOL, n)`` sets ``TOOL_CORR_W : TOOL_DATA[n] : TOOL_CORR``, each correction where
+its switch is TRUE; likewise the base, ``FRAMES``, ``STOOL2`` and ``SBASE``.
+"""
+_PAIRS = [pair for both in CORRECTIONS.values() for pair in both]
+CORRECTION_FRAMES = frozenset(frame for frame, _ in _PAIRS)
+SWITCHES = frozenset(switch for _, switch in _PAIRS)
+PERHAPS = "perhaps"
+"""Value of a switch that is on or off by the release of the controller."""
+HELD = frozenset(TABLES) | CORRECTION_FRAMES | SWITCHES
+"""Names of data that hold until the program sets them again."""
 
 # Routines and functions that do not move; of these, those that change what they get.
 STILL = frozenset(
@@ -107,6 +127,15 @@ def package_routines() -> Mapping[str, str]:
 
 KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}
 """Routines that change nothing of what they get."""
+
+
+def entry_name(table: str, number: int) -> str:
+    """Name an entry of a table.
+
+    >>> entry_name("base_data", 2)
+    'base_data[2]'
+    """
+    return f"{table}[{number}]"
 
 
 @dataclass
@@ -191,11 +220,9 @@ class KrlTask(TaskSymbols[KrlFile]):
     def counted(self) -> Counter[str]:
         """Names of the variables of loops, and how many loops count each."""
         found = Counter[str]()
-        for file in self.files:
-            rows = np.bincount(file.text.shape, minlength=len(file.text.said.shapes))
-            for one, count in zip(file.text.said, rows.tolist(), strict=False):
-                if isinstance(one, ir.ForLoop):
-                    found[one.name] += count
+        for text in (file.text for file in self.files):
+            rows = text.of_kind(lambda one: isinstance(one, ir.ForLoop))
+            found.update(text.statement(row).name for row in rows)
         return found
 
     @cached_property
@@ -206,7 +233,7 @@ class KrlTask(TaskSymbols[KrlFile]):
         """
         found = set[str]()
         for file in (f for f in self.files if not f.is_submit):
-            words = file.text.words(file.text.where(holds_odd), MOVE_WORDS)
+            words = file.text.words(file.text.of_kind(holds_odd), MOVE_WORDS)
             found |= words if file.routines else words.difference(TABLES)
         return frozenset(found)
 
@@ -216,6 +243,13 @@ class KrlTask(TaskSymbols[KrlFile]):
             return False
         place = self.place(name, here)
         return place is None or place[1] == CONFIG
+
+    def entry(self, table: str, number: int, here: Scope) -> Value | None:
+        """Return what an entry of a table holds at first, None where not known."""
+        found = self.datum(table, here, (number,))
+        if found is None:
+            return None
+        return self.value(found[1].value, self.scope_of_datum(*found))
 
     def is_steady(self, table: str, number: int) -> bool:
         """Return True if no statement of the files may change an entry of a table."""
@@ -247,12 +281,13 @@ class KrlTask(TaskSymbols[KrlFile]):
         A switch that no file sets is FALSE, unless a list declares it TRUE: what ran
         before may have left it so.
         """
-        own = [
-            datum for file in self.files for datum in file.data if datum.name == name
-        ]
-        values = [one.value for one in own if one.value is not None]
-        off = all(is_word(value, "false") for value in values)
-        return False if off and name not in self.written else None
+        return None if name in self._switched_on | self.written else False
+
+    @cached_property
+    def _switched_on(self) -> frozenset[str]:
+        """Switches that a list gives another value than FALSE at first."""
+        given = (one for one in self.every_datum if one.name in SWITCHES and one.value)
+        return frozenset(one.name for one in given if not is_word(one.value, "false"))
 
     @cached_property
     def beside(self) -> frozenset[str]:
@@ -301,6 +336,21 @@ class KrlTask(TaskSymbols[KrlFile]):
         written = (handed | uses.written | uses.changed | odd).difference(own)
         return _Beside(frozenset(written), frozenset(uses.read.difference(own)), called)
 
+    def values_of(self, one: ir.SourceStatement) -> list[ir.Node]:
+        """List the values that a statement takes when it runs, with all in them.
+
+        An interrupt or a trigger takes them at another time.
+        """
+        match one:
+            case said.InterruptDeclared() | said.InterruptSwitched():
+                return []
+            case said.PathTrigger(values=values):
+                return ir.walk(*values)
+            case said.KrlMove(settings=settings) | said.SplineBlock(settings=settings):
+                own = (x for x in one.children() if isinstance(x, ir.Operand))
+                return ir.walk(*own, *(setting.value for setting in settings))
+        return ir.walk(one)
+
     def note_in(self, uses: NamesUsed, file: KrlFile, one: ir.SourceStatement) -> None:
         """Note a statement; what a data list assigns is the first value of data."""
         if file.routines or not isinstance(one, ir.Assignment):
@@ -320,16 +370,19 @@ class KrlTask(TaskSymbols[KrlFile]):
     def _callers(self) -> Mapping[str, set[int]]:
         """Files by the names of routines that their statements call."""
         found = defaultdict[str, set[int]](set)
-        for number, file in enumerate(self.files):
-            for name in set[str]().union(*map(list_calls, file.text.said)):
+        for number, text in enumerate(file.text for file in self.files):
+            rows = text.of_kind(lambda one: bool(list_calls(one)))
+            for name in set[str]().union(
+                *(list_calls(text.statement(k)) for k in rows)
+            ):
                 found[name].add(number)
         return found
 
     @cached_property
     def _points(self) -> frozenset[str]:
         """Names of data that are positions."""
-        data = (datum for file in self.files for datum in file.data)
-        return frozenset(one.name for one in data if one.type in POSITIONS)
+        points = (one for one in self.every_datum if one.type in POSITIONS)
+        return frozenset(one.name for one in points)
 
     def is_taught(self, name: str, file: int, row: int) -> bool:
         """Return True if data of a statement were taught, by the cell or a comment."""
@@ -348,7 +401,9 @@ class KrlTask(TaskSymbols[KrlFile]):
                 return name
             case said.KrlAggregate(fields=fields):
                 times = Counter(f.name for f in fields)
-                once = [f for f in fields if times[f.name] == 1]
+                once = fields
+                if len(times) < len(fields):
+                    once = tuple(f for f in fields if times[f.name] == 1)
                 pairs = [(f.name, self.value(f.value, here, depth)) for f in once]
                 known = tuple((name, one) for name, one in pairs if one is not None)
                 return KnownRecord(known, len(known) == len(fields))
@@ -450,19 +505,3 @@ def _is_of_part(target: ir.DataObject) -> bool:
 def is_word(operand: ir.Operand | None, word: str) -> bool:
     """Return True if an operand is a word such as TRUE."""
     return operand == ir.DataObject(word)
-
-
-def values_of(one: ir.SourceStatement) -> list[ir.Node]:
-    """List the values that a statement takes when it runs, with all in them.
-
-    An interrupt or a trigger takes them at another time.
-    """
-    match one:
-        case said.InterruptDeclared() | said.InterruptSwitched():
-            return []
-        case said.PathTrigger(values=values):
-            return ir.walk(*values)
-        case said.KrlMove(settings=settings) | said.SplineBlock(settings=settings):
-            own = (x for x in one.children() if isinstance(x, ir.Operand))
-            return ir.walk(*own, *(setting.value for setting in settings))
-    return ir.walk(one)

@@ -65,5 +65,5 @@ def _acts_by_text(name: str, text: bytes) -> bool:
     if not KrlFileName(name).is_system_source(text):
         return False
     file = read_krl(source_from_bytes(name, text))
-    machine = KrlMachine.of(KrlTask([file]), Start())
+    machine = KrlMachine(task=KrlTask([file]), start=Start())
     return any(map(machine.routine_effects, machine.task.routines_by_file[0]))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from postproc.language.language import Cloner, NamedPoint
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import EntryLines, is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
-from postproc.language.pdl2.program import Body, Program, Variable
+from postproc.language.pdl2.program import Body, Program
 from postproc.language.text.lexer import scan_lines
 from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import (
@@ -22,7 +21,6 @@ from postproc.language.text.source import (
     Edit,
     Source,
     Span,
-    check_length,
     find_free_name,
     insert_after,
 )
@@ -32,33 +30,6 @@ LONGEST_NAME = 32  # characters of an identifier (likely)
 _EXPORTED = re.compile(r"\s+EXPORTED\s+FROM\s+\w+", re.I)
 _POINTS = frozenset({"position", "xtndpos", "jointpos"})
 _STRING = re.compile(r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\"")
-
-
-@dataclass(frozen=True)
-class CloneTarget:
-    """A variable that a move names as its destination.
-
-    Attributes:
-        file: Index of its file.
-        scope: Name of the routine that declares it, "" for the program.
-        variable: Its declaration.
-        span: Where the move names it.
-    """
-
-    file: int
-    scope: str
-    variable: Variable
-    span: Span
-
-    @property
-    def key(self) -> str:
-        """Return a text that tells variables apart."""
-        return f"{self.file}:{self.scope}/{self.variable.name.lower()}"
-
-    @property
-    def name(self) -> str:
-        """Return its name as it is written."""
-        return self.variable.name
 
 
 @dataclass
@@ -79,7 +50,7 @@ class Pdl2Cloner(Cloner):
     values: Source | None
     taken: set[str]
 
-    def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
+    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
         """Find the variable that a move goes to, as far as it can be cloned."""
         program = self.programs[file]
         row = int(np.searchsorted(program.lines.begin_line, line))
@@ -106,18 +77,20 @@ class Pdl2Cloner(Cloner):
         if variable.name.lower() != name.lower():
             raise CloneError(f"{variable.name} holds a copy of {name}")
         span = _destination(program, row, "VIA" if via else "TO", variable.name)
-        return CloneTarget(file, body.name if own else "", variable, span)
+        place = file, "", body.name if own else "", where.name
+        return NamedPoint(place, variable.name, file, span)
 
     def find_declaration(self, named: NamedPoint) -> int:
         """Return the 1-based line that declares a variable."""
-        target = cast(CloneTarget, named)
-        return int(self.programs[target.file].lines.begin_line[target.variable.row])
+        (*_, routine, name), program = named.place, self.programs[named.file]
+        own = program.routines[routine] if routine else program
+        return program.lines.line(own.variables[name].row)
 
     def clone(
         self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
     ) -> tuple[str, list[tuple[int, Edit]]]:
         """Give some moves a variable of their own, see `Cloner.clone`."""
-        first, old = cast(CloneTarget, named[0]), named[0].name
+        first, old = named[0], named[0].name
         program, at = self.programs[first.file], self.find_declaration(first)
         name = find_free_name(old, self.taken, LONGEST_NAME)
         found = [(first.file, _declare_clone(program, at, old, name))]
@@ -131,12 +104,8 @@ class Pdl2Cloner(Cloner):
                 raise CloneError("its value stands in another file")
             elif line != at:
                 found.append((file, _assign_clone(program, first, line, name, starts)))
-        for one in (cast(CloneTarget, one) for one in named):
-            source = program.lines.source
-            length = len(source.line_text(source.line_of(one.span.start)))
-            check_length(source, length + len(name) - len(old))
-            found.append((one.file, Edit(one.span, name.encode("latin-1"))))
-        return name, found
+        source = program.lines.source
+        return name, [*found, *(one.rename(source, name) for one in named)]
 
 
 def body_at(program: Program, row: int) -> Body:
@@ -194,20 +163,20 @@ def _declare_clone(program: Program, line: int, old: str, name: str) -> Edit:
 
 
 def _assign_clone(
-    program: Program, named: CloneTarget, line: int, name: str, starts: list[int]
+    program: Program, named: NamedPoint, line: int, name: str, starts: list[int]
 ) -> Edit:
     """Assign a value to the new name behind the line that gives it to the old one."""
     row = int(np.searchsorted(program.lines.begin_line, line))
     statement = program.lines.statement(row)
-    old = named.variable.name
+    old, routine = named.name, named.place[2]
     own = (
         isinstance(statement, ir.Assignment)
         and statement.target == ir.DataObject(old.lower())
         and isinstance(statement.value, ir.Composite | ir.FunctionCall)
     )
     body = body_at(program, row)  # a name there may mean another variable
-    meant = body.name == named.scope
-    if not named.scope:
+    meant = body.name == routine
+    if not routine:
         meant = old.lower() not in body.own_names
     if not (own and meant):
         raise CloneError(f"line {line} is no plain assignment of its value")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,24 +43,32 @@ class Pdl2Splitter(Splitter):
 
     programs: Sequence[Program]
 
-    def hinders(self, file: int, line: int) -> str:
-        """Say why a move must stay in one piece, see `Splitter.hinders`."""
-        if self._events:
-            return self._events
-        program = self.programs[file]
-        row = int(np.searchsorted(program.lines.begin_line, line))
+    def list_problems(self, file: int, line: int) -> Iterator[tuple[str, object]]:
+        """Yield what may forbid points on a way, see `Splitter.list_problems`."""
+        yield self._events, self._events
+        program, row = self.programs[file], self._row(file, line)
         move = program.lines.statement(row)
         if not isinstance(move, ast.Move) or program.lines.line(row) != line:
-            return "it does not stand alone on its line"
-        for problem, hinders in (
-            ("it ends on a condition (TIL)", move.til is not None),
-            ("a condition is enabled along it (WITH CONDITION)", move.conditions),
-            ("another arm moves along (SYNCMOVE)", move.sync),
-            ("it does not go TO a place", move.how != "TO" or len(move.where) != 1),
-        ):
-            if hinders:
-                return problem
-        return _in_its_text(program, row)
+            yield "it does not stand alone on its line", True
+            return
+        yield "it ends on a condition (TIL)", move.til is not None
+        yield "a condition is enabled along it (WITH CONDITION)", move.conditions
+        yield "another arm moves along (SYNCMOVE)", move.sync
+        yield "it does not go TO a place", move.how != "TO" or len(move.where) != 1
+        code = code_of(program, line)
+        cut = _HEAD.match(code) is None or code.rstrip().endswith(",")
+        yield "it stands on several lines", cut
+        settings = _WITH.search(code)
+        called = settings and "(" in settings[0]
+        yield "a routine may be called for its settings (WITH)", called
+        last = row + 1 == len(program.lines)
+        after = None if last else program.lines.statement(row + 1)
+        goes_on = _ADVANCE.search(code) and not isinstance(after, ast.Move)
+        yield "the program goes on while it moves (ADVANCE)", goes_on
+
+    def _row(self, file: int, line: int) -> int:
+        """Return the row of a move."""
+        return int(np.searchsorted(self.programs[file].lines.begin_line, line))
 
     @cached_property
     def _events(self) -> str:
@@ -75,14 +83,18 @@ class Pdl2Splitter(Splitter):
                 return "a condition that these files do not define may be enabled"
         return ""
 
-    def stops(self, file: int, line: int) -> bool:
-        """Return True if the arm may stop once more, see `Splitter.stops`."""
-        program = self.programs[file]
-        row = int(np.searchsorted(program.lines.begin_line, line)) - 1
-        for one in map(program.lines.statement, range(row, -1, -1)):
-            if not isinstance(one, ir.Assignment) or one.target.name not in _MOTION:
-                return isinstance(one, ast.Move)
-        return False
+    def statements_before(self, file: int, line: int) -> Iterator[ir.SourceStatement]:
+        """Yield what stands in front of a move, see `Splitter.statements_before`."""
+        rows = range(self._row(file, line) - 1, -1, -1)
+        return map(self.programs[file].lines.statement, rows)
+
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True if motion variables are set."""
+        return isinstance(one, ir.Assignment) and one.target.name in _MOTION
+
+    def is_plain_move(self, one: ir.SourceStatement) -> bool:
+        """Return True for every move."""
+        return isinstance(one, ast.Move)
 
     def layout(self, file: int, line: int) -> Pdl2Layout:
         """Look at a move, see `Splitter.layout`."""
@@ -126,23 +138,6 @@ class Pdl2Layout(MoveLayout):
         word, advance = ("MOVE", "") if stops else ("MOVEFLY", " ADVANCE")
         way = f"LINEAR TO {end}" if via is None else f"CIRCULAR TO {end} VIA {via}"
         return f"{word} {self.arm}{way}{advance}{self.settings}"
-
-
-def _in_its_text(program: Program, row: int) -> str:
-    """Say what in the text of a move hinders, "" where nothing does."""
-    lines = program.lines
-    line = lines.line(row)
-    code = code_of(program, line)
-    if _HEAD.match(code) is None or code.rstrip().endswith(","):
-        return "it stands on several lines"
-    settings = _WITH.search(code)
-    if settings and "(" in settings[0]:
-        return "a routine may be called for its settings (WITH)"
-    if _ADVANCE.search(code):
-        after = program.lines.statement(row + 1) if row + 1 < len(lines) else None
-        if not isinstance(after, ast.Move):
-            return "the program goes on while it moves (ADVANCE)"
-    return ""
 
 
 def _code(program: Program, rows: range) -> str:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Place
-from postproc.language.analysis.clones import TaskCloner, TaskPoint
+from postproc.language.analysis.clones import TaskCloner
 from postproc.language.analysis.declarations import Datum
+from postproc.language.language import NamedPoint
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import MOTIONS
 from postproc.language.rapid.program import inside
@@ -47,7 +48,7 @@ class RapidCloner(TaskCloner):
         return declared
 
     def declare(
-        self, points: Sequence[TaskPoint], data: Sequence[tuple[int, Datum]], name: str
+        self, points: Sequence[NamedPoint], data: Sequence[tuple[int, Datum]], name: str
     ) -> tuple[int, Edit]:
         """Declare the clone behind the original, or in the module of its moves."""
         ((file, datum),) = data
@@ -64,7 +65,7 @@ class RapidCloner(TaskCloner):
             raise CloneError("its declaration shares a line with other code")
         return file, insert_after(source, last, before + declared)
 
-    def _beside(self, points: Sequence[TaskPoint], declared: str) -> tuple[int, Edit]:
+    def _beside(self, points: Sequence[NamedPoint], declared: str) -> tuple[int, Edit]:
         """Declare a point of a system module at the head of the module of its moves."""
         files = {point.file for point in points}
         if len(files) != 1:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 from postproc.arrays import Floats
 from postproc.language import ir
-from postproc.language.insert_moves import MoveLayout, Splitter, spell, split_arguments
+from postproc.language.analysis.insert_moves import TaskSplitter
+from postproc.language.insert_moves import MoveLayout, spell, split_arguments
 from postproc.language.rapid.clones import ends_line
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
-from postproc.language.rapid.program import RapidFile
-from postproc.language.rapid.symbols import RapidTask
-from postproc.language.text.source import CloneError, Span
+from postproc.language.text.source import CloneError, Source, Span
 
 LONGEST_STATEMENT = 400  # characters, as an arc to two written targets has them
 ZONE = "z0"  # the smallest that passes a point
-_HEAD = re.compile(r"\s*(Move[LC])\b", re.I)
 _WORDS = {"movel": "MoveL", "movec": "MoveC"}
 _KEPT = frozenset("v wobj tload z inpos".split())  # options whose moves may be split
 _OPTION = re.compile(r"\\\s*(\w+)")
@@ -32,78 +31,60 @@ _READS = re.compile(rb"\b(?:CRobT|CJointT|CPos|PathRecStart)\b", re.I)
 _UNUSED = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
 
-@dataclass(frozen=True)
-class RapidSplitter(Splitter):
-    """The modules of a task, to put points on the ways of moves.
+class RapidSplitter(TaskSplitter):
+    """The modules of a task, to put points on the ways of moves."""
 
-    Attributes:
-        task: Its modules.
-        beside: Files of other tasks.
-    """
+    head = re.compile(r"\s*(Move[LC])\b", re.I)
 
-    task: RapidTask
-    beside: tuple[RapidFile, ...] = ()
-
-    def hinders(self, file: int, line: int) -> str:
-        """Say why a move must stay in one piece, see `Splitter.hinders`."""
+    def list_problems(self, file: int, line: int) -> Iterator[tuple[str, object]]:
+        """Yield what may forbid points on a way, see `Splitter.list_problems`."""
         own = self.task.files[file]
         row = own.find_move(line)
         move = own.text.statement(row)
         if not isinstance(move, ir.Instruction):
-            return "it does not stand alone on its line"
-        options = {one.name for one in move.arguments if one.name}
-        others = sorted(options - _KEPT)
-        for problem, hinders in (
-            (self._readers, bool(self._readers)),
-            ("it stands in a system module, which is not rewritten", own.is_system),
-            (f"it is {move.name}: only MoveL and MoveC get points",
-             move.name not in _WORDS or move.name in self.task.routines),
-            (f"{', '.join(others)} of it hold for the whole move", bool(others)),
-            ("options of it are passed on to its routine",
-             any(one.passed_on for one in move.arguments)),
-            (f"the program declares {ZONE} itself", ZONE in self.task.declared),
-            ("it stands on several lines", len(own.text.lines(row)) > 1),
-        ):  # fmt: skip
-            if hinders:
-                return problem
-        return ""
+            yield "it does not stand alone on its line", True
+            return
+        yield self._readers, self._readers
+        yield "it stands in a system module, which is not rewritten", own.is_system
+        other = move.name not in _WORDS or move.name in self.task.routines
+        yield f"it is {move.name}: only MoveL and MoveC get points", other
+        options = sorted({one.name for one in move.arguments if one.name} - _KEPT)
+        yield f"{', '.join(options)} of it hold for the whole move", options
+        passed_on = any(one.passed_on for one in move.arguments)
+        yield "options of it are passed on to its routine", passed_on
+        yield f"the program declares {ZONE} itself", ZONE in self.task.declared
+        yield "it stands on several lines", len(own.text.lines(row)) > 1
 
     @cached_property
     def _readers(self) -> str:
         """Say what may read where the arm is on its way, "" for nothing."""
-        files = (*self.task.files, *self.beside)
+        files = (*self.task.files, *self.task.files_beside)
         traps = any(
             getattr(routine.head, "kind", "") == "trap"
             for file in self.task.files
             for routine in file.routines
         )
         reads = any(_READS.search(file.text.source.data) for file in files)
-        if reads and (traps or self.beside):
+        if reads and (traps or self.task.files_beside):
             return "a TRAP or another task may read where the arm is on its way"
         return ""
 
-    def stops(self, file: int, line: int) -> bool:
-        """Return True if the arm may stop once more, see `Splitter.stops`."""
-        own = self.task.files[file]
-        row = own.find_move(line)
-        for one in map(own.text.statement, range(row - 1, -1, -1)):
-            if not isinstance(one, ir.Instruction) or one.name not in _MOTION:
-                return isinstance(one, ir.Instruction) and one.name in _PLAIN
-        return False
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True for instructions that set modes."""
+        return isinstance(one, ir.Instruction) and one.name in _MOTION
 
-    def layout(self, file: int, line: int) -> RapidLayout:
-        """Look at a move, see `Splitter.layout`."""
-        text = self.task.files[file].text
-        source, row = text.source, self.task.files[file].find_move(line)
-        start, (begin, end) = int(source.line_starts[line - 1]), text.span(row)
-        if source.text[start:begin].strip() or not ends_line(source, end):
+    def is_plain_move(self, one: ir.SourceStatement) -> bool:
+        """Return True for moves without a process."""
+        return isinstance(one, ir.Instruction) and one.name in _PLAIN
+
+    def lay_out(
+        self, source: Source, start: int, code: str, head: re.Match[str]
+    ) -> RapidLayout:
+        """Look at a move, see `TaskSplitter.lay_out`."""
+        if not ends_line(source, start + len(code)):
             raise CloneError("it does not stand alone on its line")
-        code = source.text[start:end].rstrip().removesuffix(";")
-        head = _HEAD.match(code)
-        if head is None:
-            raise CloneError("the move is not understood")
-        skip = head.end()
-        items = [Span(a + skip, b + skip) for a, b in split_arguments(code[skip:])]
+        code = code.removesuffix(";")
+        items = split_arguments(code, head.end())
         arc = _WORDS[head[1].lower()] == "MoveC"
         if len(items) != 4 + arc:
             raise CloneError("its arguments are not understood")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import NO_POINTS, Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.task_machine import (
@@ -21,7 +21,6 @@ from postproc.language.analysis.task_machine import (
     TaskMachine,
     scope_at,
 )
-from postproc.language.language import Start
 from postproc.language.rapid import errors
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
@@ -36,19 +35,16 @@ from postproc.language.rapid.modal_state import (
     ANYTHING,
     AT_START,
     HARMLESS,
-    Modes,
-    change_modes,
-    list_set_modes,
+    RapidModeReader,
 )
 from postproc.language.rapid.moves import (
     Goals,
-    RapidVisit,
     are_targets,
     own_numbers,
     pose_of,
 )
-from postproc.language.rapid.program import RapidFile, inside, is_move
-from postproc.language.rapid.symbols import RapidTask, as_assignment, functions_in
+from postproc.language.rapid.program import inside, is_move
+from postproc.language.rapid.symbols import RapidTask, as_assignment
 from postproc.language.visits import START
 
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
@@ -66,7 +62,6 @@ class RapidMachine(TaskMachine):
 
     Attributes:
         task: Its modules.
-        goals: Reads destinations, tools, work objects and zones.
         ends: What holds where the main routine ends.
         restarts: What holds where a cycle ends before that.
     """
@@ -75,38 +70,26 @@ class RapidMachine(TaskMachine):
     acting = (ir.Instruction,)
     passed = _PLAIN
     task: RapidTask = field(kw_only=True)
-    goals: Goals = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], errors.ErrorHandlers] = field(default_factory=dict)
     _exits: dict[Context, tuple[errors.ErrorExit, ...]] = field(default_factory=dict)
 
-    @classmethod
-    def of(
-        cls, task: RapidTask, start: Start, beside: Sequence[RapidFile] = ()
-    ) -> RapidMachine:
-        """Get ready to follow a task.
-
-        Args:
-            task: The task.
-            start: What the cell says.
-            beside: Files of other tasks.
-        """
-        texts = [file.text for file in (*task.files, *beside)]
-        return cls(texts, start, task=task, goals=Goals(task))
+    @cached_property
+    def goals(self) -> Goals:
+        """What reads destinations, tools, work objects and zones."""
+        return Goals(self.task)
 
     def run(self) -> None:
         """Follow every way from the main routine."""
         mains = self.task.routines.get("main", [])
-        found = mains if len(mains) == 1 else self._procedures()
+        found = mains if len(mains) == 1 else self._of_kind("proc")
         here = self.begin(frozenset([START]), AT_START)
         if len(mains) != 1:
             here = here.forget()
             self.say(Scope(0, "", "", row=0), Code.NO_MAIN, _NO_MAIN)
-        every = [one for own in self.task.routines.values() for one in own]
-        traps = [one for one in every if one.rows.head.kind == "trap"]
-        if any(map(self.routine_effects, traps)):
-            here = replace(here, modes=replace(here.modes, blocked=frozenset([_TRAP])))
+        if any(map(self.routine_effects, self._of_kind("trap"))):
+            here = here.blocking(_TRAP)
         for routine in found:
             self.call_routine(routine, None, here)
         self.follow()
@@ -134,7 +117,7 @@ class RapidMachine(TaskMachine):
         known, found = read_known_instructions(), set[tuple[str, Any]]()
         modal = {name for name, kind in known.items() if kind == "modal"}
         modal -= {*self.task.routines, *STOPPED}
-        for routine in (r for own in self.task.routines.values() for r in own):
+        for routine in self.task.every_routine:
             scope, rows = self.task.scope_of(routine), routine.inside
             text = self.texts[routine.file]
             for row in text.where(
@@ -143,19 +126,13 @@ class RapidMachine(TaskMachine):
             ):  # fmt: skip
                 one = inside(text.statement(row))
                 if isinstance(one, ir.Instruction):
-                    given = self._list_set(one, scope.at(row))
+                    given = self._modes(scope.at(row)).list_set(one)
                     found |= set() if given >= ANYTHING else given
         return {name for name, value in found if value != getattr(AT_START, name)}
 
-    def _list_set(
-        self, one: ir.Instruction, scope: Scope
-    ) -> frozenset[tuple[str, Any]]:
-        """Return the modes that an instruction sets, whatever holds before it."""
-        return list_set_modes(partial(self._change_modes, one, scope))
-
-    def _procedures(self) -> list[TaskRoutine]:
-        routines = (one for found in self.task.routines.values() for one in found)
-        return [one for one in routines if one.rows.head.kind == "proc"]
+    def _of_kind(self, kind: str) -> list[TaskRoutine]:
+        """Return all routines of a kind."""
+        return [one for one in self.task.every_routine if one.rows.head.kind == kind]
 
     def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
         """Return place and turn of MoveL to numbers, see `TaskMachine.places_of`."""
@@ -164,6 +141,7 @@ class RapidMachine(TaskMachine):
         return own_numbers(one)
 
     is_plain = staticmethod(are_targets)
+    is_move = staticmethod(is_move)
     inside = staticmethod(inside)
 
     @staticmethod
@@ -181,11 +159,7 @@ class RapidMachine(TaskMachine):
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
-        if self._handlers_of(context).moves:
-            here = replace(
-                here, modes=replace(here.modes, blocked=here.modes.blocked | {_HANDLER})
-            )
-        return here
+        return here.blocking(_HANDLER) if self._handlers_of(context).moves else here
 
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
@@ -231,7 +205,7 @@ class RapidMachine(TaskMachine):
             if not self._may_raise(one, way.numbers):
                 continue
             if not beside:
-                self._handle(at, way, replace(here, origins=NOWHERE))
+                self._handle(at, way, here.elsewhere())
             elif beside.row > at.row and errors.may_be_skipped(one):
                 self._handle(at, way, here)
 
@@ -246,7 +220,7 @@ class RapidMachine(TaskMachine):
         for way in self._exits_of(at.context):
             named = way.numbers is not None and bool(way.numbers & errors.PATH_ERRORS)
             if way.own and (named or (always and self._may_raise(one, way.numbers))):
-                self._handle(at, way, replace(here, origins=NOWHERE))
+                self._handle(at, way, here.elsewhere())
 
     def _handle(self, at: At, way: errors.ErrorExit, here: Arrived) -> None:
         """Go on behind an error."""
@@ -299,14 +273,14 @@ class RapidMachine(TaskMachine):
 
     def _run_all_beside(self) -> None:
         """Note that every procedure may be called."""
-        for routine in self._procedures():
+        for routine in self._of_kind("proc"):
             self.run_beside(routine)
 
     def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return all procedures where a text names the one that is called."""
         inner = inside(one)
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
-            return self._procedures()
+            return self._of_kind("proc")
         return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
@@ -318,15 +292,6 @@ class RapidMachine(TaskMachine):
         rows = routine.inside
         heads = self.texts[routine.file].where(self.handles, rows.start, rows.stop)
         yield from ((routine.file, row, rows.stop) for row in heads[:1])
-
-    def read_visits(
-        self, one: Any, scope: Scope, here: Arrived | None
-    ) -> Iterator[RapidVisit]:
-        """Read the visits of a move, see `TaskMachine.read_visits`."""
-        one = inside(one)
-        if is_move(one):
-            modes, points = (here.modes, here.points) if here else (AT_START, NO_POINTS)
-            yield from self.goals.visits(one, scope, modes, points)
 
     def _compact(
         self, at: At, inside: ir.SourceStatement, here: Arrived
@@ -360,8 +325,8 @@ class RapidMachine(TaskMachine):
             self.lost |= here.origins
             return here.forget()
         if kind == "modal":
-            changed = self._change_modes(one, scope_at(at, here), here.modes)
-            return replace(here, modes=changed.allowing())
+            changed = self._modes(scope_at(at, here)).change(one, here.modes)
+            return here.with_modes(changed.allowing())
         if kind in ("still", "modal") or self.declares_motionless(name):
             return here
         if name == BY_NAME:
@@ -370,10 +335,9 @@ class RapidMachine(TaskMachine):
             return self.unknown(at, here, _LEFT)
         return self.outside(at, name, here)
 
-    def _change_modes(self, one: ir.Instruction, scope: Scope, modes: Modes) -> Modes:
-        """Carry out an instruction that changes how the moves after it are."""
-        return change_modes(
-            one.name, one.arguments, modes,
+    def _modes(self, scope: Scope) -> RapidModeReader:
+        """Return what carries out instructions that stand somewhere."""
+        return RapidModeReader(
             lambda operand: self.task.number(operand, scope),
             lambda operand: pose_of(self.task.value(operand, scope)),
             lambda operand: self.goals.load(operand, scope),
@@ -385,7 +349,7 @@ class RapidMachine(TaskMachine):
         after = self.arrive(at, one, here)
         (last,) = after.origins
         if math.isnan(self.visits[last].zone_mm):
-            after = replace(after, modes=after.modes.settle())
+            after = after.with_modes(after.modes.settle())
         if one.name in SYNCHRONOUS:
             return self._synchronous(at, one, after)
         return after
@@ -404,8 +368,9 @@ class RapidMachine(TaskMachine):
             what = "calls a procedure on its way that may move the arm"
             what = what if found else f"{what}: it is in no file of the task"
             here = self.unknown(at, here, what)
-        modes = here.modes.allowing(ANYTHING if given is None else given)
-        return replace(here, modes=modes)
+        return here.with_modes(
+            here.modes.allowing(ANYTHING if given is None else given)
+        )
 
     def _list_set_modes(
         self, routine: TaskRoutine
@@ -416,7 +381,8 @@ class RapidMachine(TaskMachine):
         scope, found = self.task.scope_of(routine), set[tuple[str, Any]]()
         for row in routine.inside:
             one = self.texts[routine.file].statement(row)
-            effects, called = self.read_calls(functions_in(one), scope)
+            names = (call.name for call in self.list_asked(one))
+            effects, called = self.read_calls(names, scope)
             if effects.union(*map(self.routine_effects, called)):
                 return None
             one = inside(one)
@@ -424,7 +390,7 @@ class RapidMachine(TaskMachine):
             if isinstance(one, ir.Instruction) and not own:
                 kind = read_known_instructions().get(one.name)
                 if kind == "modal" and one.name not in STOPPED:
-                    found |= self._list_set(one, scope.at(row))
+                    found |= self._modes(scope.at(row)).list_set(one)
                     continue
                 if kind == "still" or self.declares_motionless(one.name):
                     continue
@@ -436,7 +402,7 @@ class RapidMachine(TaskMachine):
         self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived:
         """Allow for what the functions of a statement do, and for its errors."""
-        for name in functions_in(one):
+        for name in (call.name for call in self.list_asked(one)):
             if name in WAITING and name not in self.task.routines:
                 self.pause(here)
             still = name in STILL_FUNCTIONS or self.declares_motionless(name)
@@ -453,7 +419,7 @@ class RapidMachine(TaskMachine):
 
     def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
         """Yield functions, the instruction, and what a move calls by a text."""
-        yield from functions_in(one)
+        yield from (call.name for call in self.list_asked(one))
         one = inside(one)
         if isinstance(one, ir.Instruction):
             yield one.name

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from postproc.arrays import Floats
 from postproc.files import FolderListing
 from postproc.language import language
-from postproc.language.analysis.task_language import TaskLanguage, check_routines
-from postproc.language.analysis.task_machine import follow
+from postproc.language.analysis.task_language import TaskLanguage
 from postproc.language.insert_moves import Splitter
 from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.rapid import backup
@@ -20,9 +18,8 @@ from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
-from postproc.language.rapid.symbols import RapidTask, other_tasks
+from postproc.language.rapid.symbols import RapidTask
 from postproc.language.rapid.to_visits import RapidCollector
-from postproc.language.text.blocks import read_once
 from postproc.language.text.source import Source
 
 
@@ -35,6 +32,13 @@ class Rapid(TaskLanguage):
     comment = "!"
     dialect = RAPID_DIALECT
     grammar = "rapid"
+    cure = "Give a RAPID module"
+    tells_system = False
+    read_file = staticmethod(read_rapid)
+    task = RapidTask
+    machine = RapidMachine
+    collector = RapidCollector
+    clones = RapidCloner
     begins = re.compile(
         rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I
     )
@@ -47,36 +51,19 @@ class Rapid(TaskLanguage):
     )
     goes_on = True
 
-    def read(
-        self,
-        sources: Sequence[Source],
-        start: language.Start,
-        known: Sequence[RapidFile] = (),
-    ) -> language.JobReading:
-        """Read the modules of a task, the one with main first; see `Language.read`."""
-        task, beside = _tasks(sources, start, known)
-        files = [*task.files, *beside]
-        machine = follow(lambda: RapidMachine.of(task, start, beside))
-        visits = RapidCollector(machine).collect()
-        system = frozenset(f.text.source.name for f in task.files if f.is_system)
-        own = (d for file in task.files for d in file.diagnostics)
-        odd = (d for d in own if d.file not in system)
-        found = self.report(machine, visits, files, odd, ("main", "module"))
-        return replace(found, untouched=system)
+    def name_main(self, files: Sequence[RapidFile]) -> tuple[str, str]:
+        """Name the main routine, and what a file is called."""
+        return "main", "module"
 
-    def cloner(self, sources: Sequence[Source]) -> language.Cloner:
-        """Parse the modules of a task to clone points in them."""
-        task, beside = _tasks(sources, language.Start())
-        cloner = RapidCloner(task)
-        cloner.take_words(beside)  # data of one name may be shared with them
-        return cloner
+    def is_beside(self, source: Source) -> bool:
+        """Return True for a module of another task."""
+        return bool(RapidFileName(source.name).task_beside)
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the modules of a task to put points on the ways of its moves."""
         from postproc.language.rapid.insert_moves import RapidSplitter
 
-        task, beside = _tasks(sources, language.Start())
-        return RapidSplitter(task, tuple(beside))
+        return RapidSplitter(self.parse(sources, language.Start()))
 
     def reads(
         self,
@@ -103,23 +90,3 @@ class Rapid(TaskLanguage):
 
 
 LANGUAGE = Rapid
-
-
-def _tasks(
-    sources: Sequence[Source], start: language.Start, known: Sequence[RapidFile] = ()
-) -> tuple[RapidTask, list[RapidFile]]:
-    """Read the task of a program, and the files of the tasks beside it.
-
-    Raises:
-        ProgramError: A file of the task is none, or the first holds no routine.
-    """
-    own = [source for source in sources if not RapidFileName(source.name).task_beside]
-    files = [read_once(source, known, read_rapid) for source in own]
-    check_routines(files[0], "Give a RAPID module")
-    before = {file.text.source.name: file for file in known}
-    beside = []
-    for source in sources[len(own) :]:
-        file = before.get(source.name)
-        same = file is not None and file.text.source == source
-        beside.append(file if file is not None and same else read_rapid(source))
-    return RapidTask(files, start.taught, other_tasks(beside)), beside

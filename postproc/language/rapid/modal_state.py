@@ -141,58 +141,69 @@ HARMLESS = frozenset(
 )
 
 
-def change_modes(
-    name: str,
-    arguments: Sequence[ir.Argument],
-    modes: Modes,
-    number: Callable[[ir.Operand | None], float],
-    pose: Callable[[ir.Operand | None], tuple[float, ...]],
-    load: Callable[[ir.Operand | None], tuple[float, ...]],
-) -> Modes:
-    """Carry out an instruction that changes how the moves after it are.
+Read = Callable[[ir.Operand | None], tuple[float, ...]]
 
-    Args:
-        name: The instruction, in lower case.
-        arguments: Its arguments.
-        modes: What holds before it.
+
+@dataclass(frozen=True)
+class RapidModeReader:
+    """Carries out instructions that change how the moves after them are.
+
+    Attributes:
         number: Evaluates a number, NaN where it is not known.
-        pose: Evaluates a pose, empty where it is not known.
-        load: Evaluates a load, empty where it is not known.
+        pose, load: Evaluate a pose and a load, empty where they are not known.
     """
-    switches = {one.name for one in arguments if one.name and one.value is None}
-    placed = [one.value for one in arguments if not one.name]
-    match name:
-        case "confl" | "confj":
-            checked = Switch.ON if switches <= {"on"} else Switch.UNKNOWN
-            checked = Switch.OFF if switches == {"off"} else checked
-            if name == "confl":
-                return replace(modes, confl=checked)
-            return replace(modes, confj=checked)
-        case "pdispoff":
-            return replace(modes, shift=NO_SHIFT)
-        case "pdispset":
-            return replace(modes, shift=pose(placed[0] if placed else None))
-        case "pdispon":
-            return replace(modes, shift=UNKNOWN_SHIFT)
-        case "singarea":
-            return _singular(switches, modes)
-        case "cirpathmode":
-            return replace(modes, arc_law=_ARC_LAWS.get(frozenset(switches), LOST.law))
-        case "velset":
-            share = number(placed[0] if placed else None) / 100.0
-            return replace(modes, override=share if 0.0 < share <= 1.0 else 0.0)
-        case "speedlimaxis" | "speedlimcheckpoint":
-            return replace(modes, override=0.0)
-        case "gripload":
-            return replace(modes, grip=load(placed[0] if placed else None))
-    which = _which(name, placed)
-    if name in BLOCKING:
-        begun = _about(BLOCKING[name][1], which)
-        return replace(modes, blocked=modes.blocked | {begun})
-    if name in _ENDING:
-        kept = {why for why in modes.blocked if not _ends(name, which, why)}
-        return replace(modes, blocked=frozenset(kept))
-    return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
+
+    number: Callable[[ir.Operand | None], float]
+    pose: Read
+    load: Read
+
+    def list_set(self, one: ir.Instruction) -> frozenset[tuple[str, Any]]:
+        """Return the modes that an instruction sets, whatever holds before it."""
+        plain, other = (self.change(one, modes) for modes in (AT_START, OTHERWISE))
+        return frozenset(
+            (name, getattr(plain, name))
+            for name in Modes.names()
+            if getattr(plain, name) != getattr(AT_START, name)
+            or getattr(other, name) != getattr(OTHERWISE, name)
+        )
+
+    def change(self, one: ir.Instruction, modes: Modes) -> Modes:
+        """Carry an instruction out."""
+        name = one.name
+        switches = {a.name for a in one.arguments if a.name and a.value is None}
+        placed = [a.value for a in one.arguments if not a.name]
+        match name:
+            case "confl" | "confj":
+                checked = Switch.ON if switches <= {"on"} else Switch.UNKNOWN
+                checked = Switch.OFF if switches == {"off"} else checked
+                if name == "confl":
+                    return modes.with_(confl=checked)
+                return modes.with_(confj=checked)
+            case "pdispoff":
+                return modes.with_(shift=NO_SHIFT)
+            case "pdispset":
+                return modes.with_(shift=self.pose(placed[0] if placed else None))
+            case "pdispon":
+                return modes.with_(shift=UNKNOWN_SHIFT)
+            case "singarea":
+                return _singular(switches, modes)
+            case "cirpathmode":
+                return modes.with_(arc_law=_ARC_LAWS.get(frozenset(switches), LOST.law))
+            case "velset":
+                share = self.number(placed[0] if placed else None) / 100.0
+                return modes.with_(override=share if 0.0 < share <= 1.0 else 0.0)
+            case "speedlimaxis" | "speedlimcheckpoint":
+                return modes.with_(override=0.0)
+            case "gripload":
+                return modes.with_(grip=self.load(placed[0] if placed else None))
+        which = _which(name, placed)
+        if name in BLOCKING:
+            begun = _about(BLOCKING[name][1], which)
+            return modes.with_(blocked=modes.blocked | {begun})
+        if name in _ENDING:
+            kept = {why for why in modes.blocked if not _ends(name, which, why)}
+            return modes.with_(blocked=frozenset(kept))
+        return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
 
 
 def _which(name: str, placed: Sequence[ir.Operand | None]) -> str:
@@ -224,21 +235,6 @@ def _ends(name: str, which: str, why: Reason) -> bool:
     return name not in ONE_OF_MANY or why.about == which != _ANY
 
 
-def list_set_modes(change: Callable[[Modes], Modes]) -> frozenset[tuple[str, Any]]:
-    """Return the modes that an instruction sets, whatever holds before it.
-
-    Args:
-        change: Carries the instruction out.
-    """
-    one, other = change(AT_START), change(OTHERWISE)
-    return frozenset(
-        (name, getattr(one, name))
-        for name in Modes.names()
-        if getattr(one, name) != getattr(AT_START, name)
-        or getattr(other, name) != getattr(OTHERWISE, name)
-    )
-
-
 # Only \CirPointOri takes the tool through the orientation of the circle's point.
 _ARC_LAWS = {
     frozenset[str](): OrientationLaw.ALONG_PATH,
@@ -252,4 +248,4 @@ def _singular(switches: set[str], modes: Modes) -> Modes:
     laws = {"off": OrientationLaw.ONE_AXIS, "wrist": OrientationLaw.WRIST_JOINTS}
     (word,) = switches if len(switches) == 1 else ("",)
     law = laws.get(word, OrientationLaw.UNKNOWN)
-    return replace(modes, law=law, wrist=word == "wrist")
+    return modes.with_(law=law, wrist=word == "wrist")

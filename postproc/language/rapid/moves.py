@@ -13,7 +13,7 @@ from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
+from postproc.language.analysis.assigned_points import Points, Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
@@ -126,10 +126,9 @@ class Goals:
 
     task: RapidTask
     _frames: dict[tuple[object, ...], FrameOfMove] = field(default_factory=dict)
-    _known: dict[
-        tuple[int, Scope],
-        tuple[ir.Instruction, tuple[FrameOfMove, FrameOfMove, float, float]],
-    ] = field(default_factory=dict)
+    _known: dict[tuple[object, ...], tuple[FrameOfMove, FrameOfMove, float, float]] = (
+        field(default_factory=dict)
+    )
     _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
 
     def visits(
@@ -138,11 +137,12 @@ class Goals:
         """Read the visits of a move: the point of an arc, and its end."""
         signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
-        watched = points.watch()
-        there = replace(scope, points=watched)
+        start, watched = scope, points.watch()
+        if points.routines:
+            start = replace(scope, points=points)
+        there = start if watched is points else replace(scope, points=watched)
         tool, wobj, zone, speed = self._conditions(one, ends, there)
         motion = _motion(one.name, signature)
-        start = replace(scope, points=points)
         reader = RapidGoal(self.task, start, signature.joints, self._slots)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
@@ -188,18 +188,19 @@ class Goals:
     ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
         """Read tool, work object, zone [mm] and speed [m/s] of a move.
 
-        Moves of one form that only name them have the same.
+        Moves that only name them, and name the same, have the same.
         """
-        others = [a.value for a in one.arguments if all(a.value is not e for e in ends)]
+        own = [a for a in one.arguments if all(a.value is not e for e in ends)]
         named = all(
             value is None or (isinstance(value, ir.DataObject) and not value.steps)
-            for value in others
-        ) and not any(self._is_assigned(value) for value in others)
-        key = id(one), replace(scope, points=NO_POINTS, row=-1)
+            for value in (a.value for a in own)
+        ) and not any(self._is_assigned(a.value) for a in own)
+        stops = one.name in AT_A_STOP
+        key = stops, *own, *scope.place, scope.loops, scope.given
         if named and key in self._known:
-            return self._known[key][1]
+            return self._known[key]
         arguments = _Arguments(self.task, one.arguments, scope)
-        zone = np.nan if one.name in AT_A_STOP else arguments.zone()
+        zone = np.nan if stops else arguments.zone()
         operand = arguments.option("wobj")
         wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
         operand = arguments.of_type("tooldata")
@@ -208,7 +209,7 @@ class Goals:
             tool = self._frame("tool", operand, arguments)
         found = tool, wobj, zone, arguments.speed()
         if named:
-            self._known[key] = one, found  # it keeps its id from being used again
+            self._known[key] = found
         return found
 
     # Tools and work objects.
@@ -227,7 +228,7 @@ class Goals:
         if isinstance(operand, ir.DataObject) and not operand.steps:
             if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
-            key = kind, operand.name, scope.file, scope.module, scope.routine
+            key = kind, operand.name, *scope.place
             if self._is_assigned(operand):
                 return self._read_frame(kind, operand, arguments)
             if key not in self._frames:
@@ -296,20 +297,36 @@ class RapidGoal(goals.GoalReader):
         )  # fmt: skip
 
     def read_point(self, operand: ir.Operand | None) -> FoundGoal:
-        """Read a point; fast where all of its numbers stand in the move."""
-        if isinstance(operand, ir.Composite):
-            if id(operand) not in self.slots:
-                self.slots[id(operand)] = operand, _plain_slots(operand)
-            slots, count = self.slots[id(operand)][1], 6 if self.joints else 11
-            if len(slots) == count + 6:
-                text = self.task.files[self.here.file].text
-                at = [int(text.first[self.here.row]) + slot for slot in slots]
-                values = text.value[at].tolist()
-                found = self._goal_of(values[:count], values[count:])
-                if np.isfinite(values).all() and not found.why:
-                    own = (*at[:count], *(-1,) * (WIDTH - count))
-                    return replace(found, file=self.here.file, slots=own)
-        return super().read_point(operand)
+        """Read a point; fast where all of its numbers stand in one statement."""
+        file, row, written, name = self.here.file, self.here.row, operand, ""
+        if isinstance(operand, ir.DataObject) and not operand.steps:
+            found = self.task.constant(operand.name, self.here)
+            if found is not None:
+                file, row, written = found[0], found[1].row, found[1].value
+                name = operand.name
+        goal = None
+        if isinstance(written, ir.Composite):
+            goal = self._read_written(written, file, row)
+        if goal is None:
+            return super().read_point(operand)
+        return self.name_goal(goal, name) if name else goal
+
+    def _read_written(
+        self, written: ir.Composite, file: int, row: int
+    ) -> FoundGoal | None:
+        """Read a point that is written in numbers alone, None for any other."""
+        if id(written) not in self.slots:
+            self.slots[id(written)] = written, _plain_slots(written)
+        slots, count = self.slots[id(written)][1], 6 if self.joints else 11
+        if len(slots) != count + 6:
+            return None
+        text = self.task.files[file].text
+        at = [int(text.first[row]) + slot for slot in slots]
+        values = text.value[at].tolist()
+        found = self._goal_of(values[:count], values[count:])
+        if not np.isfinite(values).all() or found.why:
+            return None
+        return replace(found, file=file, slots=(*at[:count], *(-1,) * (WIDTH - count)))
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read Offs and RelTool: the point is moved along."""

@@ -82,7 +82,8 @@ def read_rapid(source: Source) -> RapidFile:
     """
     text = read_statements(source)
     outline = Outline(text, _WORDS)
-    for row in text.where(lambda one: not (is_move(one) or holds_odd(one))):
+    odd = text.of_kind(holds_odd)
+    for row in text.of_kind(lambda one: not (_is_called(one) or holds_odd(one))):
         one = text.statement(row)
         if isinstance(one, ModuleHead | RecordHead):
             outline.begin(
@@ -94,20 +95,24 @@ def read_rapid(source: Source) -> RapidFile:
     # Without its end, calls may stand behind a record.
     ended = (r for r in outline.of("record") if r.ended)
     within = {row for r in ended for row in range(r.first, r.last + 1)}
-    moves = text.find_rows(is_move)
-    moves = moves[~np.isin(moves, sorted(within))] if within else moves
+    moves = [row for row in text.where(is_move) if row not in within]
     for row in (row for row in text.where(_lacks_position) if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
-    for row in (row for row in text.where(holds_odd) if row not in within):
+    for row in (row for row in odd if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
     return RapidFile(
         text,
         tuple(outline.of(*_ROUTINES)),
         tuple(outline.data),
-        moves,
+        np.array(moves, dtype=np.int32),
         tuple(sorted({*outline.diagnostics})),
         tuple(outline.of("module")),
     )
+
+
+def _is_called(one: ir.SourceStatement) -> bool:
+    """Return True for an instruction, and for what stands behind a condition."""
+    return isinstance(one, ir.Instruction | CompactIf)
 
 
 def inside(one: ir.SourceStatement) -> ir.SourceStatement:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -68,11 +69,7 @@ _READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 
 
 @dataclass
 class RapidTask(TaskSymbols[RapidFile]):
-    """The modules of a task.
-
-    Attributes:
-        others: Tasks that run at the same time.
-    """
+    """The modules of a task."""
 
     comments = COMMENTS
     layouts = RECORDS
@@ -80,7 +77,6 @@ class RapidTask(TaskSymbols[RapidFile]):
     targets = ("robtarget", "jointtarget")
     constants: ClassVar = {"true": 1.0, "false": 0.0, "pi": math.pi}
     functions = "func"
-    others: Sequence[RapidTask] = ()
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     def new_uses(self) -> NamesUsed:
@@ -144,12 +140,20 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     # What other tasks do: global persistents of one name are the same data.
 
+    @cached_property
+    def others(self) -> Sequence[RapidTask]:
+        """The tasks that run at the same time, by the names of their files."""
+        tasks = defaultdict[str, list[RapidFile]](list)
+        for file in self.files_beside:
+            tasks[RapidFileName(file.text.source.name).task_beside].append(file)
+        return [RapidTask(own) for own in tasks.values()]
+
     def is_changed_beside(self, file: int, datum: Datum) -> bool:
         """Return True if another task may change data, or begin with other values."""
         key = file, datum.row
         if key not in self._moved:
             self._moved[key] = _is_shared(datum)  # while it is worked out
-            own = self._first_value(file, datum)
+            own = self._first_value(file, datum) if self._moved[key] else None
             self._moved[key] = _is_shared(datum) and any(
                 other.may_set(datum.name, own) for other in self.others
             )
@@ -179,8 +183,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     @cached_property
     def persistents(self) -> frozenset[str]:
         """Names of data that tasks share with others that declare them too."""
-        data = (datum for file in self.files for datum in file.data)
-        return frozenset(one.name for one in data if _is_shared(one))
+        return frozenset(one.name for one in self.every_datum if _is_shared(one))
 
     @cached_property
     def strange(self) -> frozenset[str]:
@@ -263,15 +266,6 @@ class RapidTask(TaskSymbols[RapidFile]):
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)
-
-
-def other_tasks(files: Sequence[RapidFile]) -> list[RapidTask]:
-    """Group the files of tasks that run beside a program, by the names of files."""
-    tasks: dict[str, list[RapidFile]] = {}
-    for file in files:
-        task = RapidFileName(file.text.source.name).task_beside
-        tasks.setdefault(task, []).append(file)
-    return [RapidTask(own) for own in tasks.values()]
 
 
 def _is_shared(datum: Datum) -> bool:

@@ -161,17 +161,18 @@ File = TypeVar("File", bound=TaskFile)
 def read_once(
     source: Source, known: Sequence[File], read: Callable[[Source], File]
 ) -> File:
-    """Read a file, unless it was read before.
+    """Read a file, unless it was read before."""
+    same = (file for file in known if file.text.source == source)
+    return next(same, None) or read(source)
+
+
+def check_blocks(file: TaskFile) -> None:
+    """Refuse a file whose blocks do not close.
 
     Raises:
-        ProgramError: Its blocks do not close: what runs when is not known.
+        ProgramError: What runs when is not known.
     """
-    for file in known:
-        if file.text.source == source:
-            return file
-    file = read(source)
     for found in file.diagnostics:
         if found.code == Code.OPEN_BLOCK:
             cure = "Close it: what runs when is not known without"
-            raise ProgramError(source.name, found.message, cure, line=found.line)
-    return file
+            raise ProgramError(found.file, found.message, cure, line=found.line)

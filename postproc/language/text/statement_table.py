@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
@@ -61,10 +62,15 @@ class Statements(Generic[T]):
         found: Bools = self.said.which(test)[self.shape]
         return found
 
-    def find_rows(
+    def of_kind(self, test: Callable[[T], bool]) -> list[int]:
+        """List statements that pass a test that no name in them decides."""
+        rows: list[int] = np.flatnonzero(self.which(test)).tolist()
+        return rows
+
+    def where(
         self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
-    ) -> Indices:
-        """Return statements that pass a test, which is asked once for each shape.
+    ) -> list[int]:
+        """List statements that pass a test, which is asked once for each shape.
 
         Args:
             test: The test.
@@ -75,14 +81,7 @@ class Statements(Generic[T]):
         number, example = templates.number_in_order(shape)
         passed = [test(self.said[k]) for k in shape[example].tolist()]
         rows = first + np.flatnonzero(np.array(passed, dtype=bool)[number])
-        return rows.astype(np.int32)
-
-    def where(
-        self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
-    ) -> list[int]:
-        """List statements that pass a test, as `find_rows`."""
-        rows: list[int] = self.find_rows(test, first, behind).tolist()
-        return rows
+        return [*rows.tolist()]
 
     def line(self, row: int) -> int:
         """Return the 1-based line that a statement begins on."""
@@ -112,6 +111,17 @@ class StatementText(Statements[T]):
         """Return the 1-based lines that a statement stands on."""
         begin, end = self.span(row)
         return range(self.line(row), self.source.line_of(max(end - 1, begin)) + 1)
+
+    @cached_property
+    def end_line(self) -> Indices:
+        """1-based line on which each statement ends, (n,)."""
+        return self.source.lines_of(np.maximum(self.end - 1, self.begin))
+
+    def rows_on(self, line: int) -> range:
+        """Return the statements that stand on a line, or begin or end there."""
+        begin, end = self.begin_line, self.end_line
+        behind = int(np.searchsorted(begin, line, side="right"))
+        return range(int(np.searchsorted(end, line)), behind)
 
     def row_of(self, slot: int) -> int:
         """Return the statement that a number stands in."""

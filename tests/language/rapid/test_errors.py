@@ -157,3 +157,8 @@ def test_a_handler_in_a_block_is_read_to_its_end():
     handler = ["DEFAULT:", "TRYNEXT;", "ENDTEST"]
     found = behind(handler, MOVING, head="TEST n\nCASE 1:\nERROR")
     assert any(reasons(found)) or any(ELSEWHERE in at for at in origins(found)[1:])
+
+
+def test_a_loop_that_ends_behind_a_handler_is_followed():
+    loop = ("FOR k FROM 1 TO 2 DO", L.format("p1"), "ERROR", "TRYNEXT;", "ENDFOR")
+    assert len(task(*loop).visits) == 1
