@@ -209,8 +209,11 @@ class Collector:
     def _mark_pauses(self, visits: Visits, visit: Indices) -> Visits:
         """Say of which fly points it is not known whether the arm stops there."""
         ids = self.machine.paused, self.machine.lost
-        paused, lost = ([visit[k] for k in some if k >= 0] for some in ids)
-        unsure = {*lost, *np.intersect1d(paused, visits.graph.pred).tolist()}
+        paused, lost = (
+            np.array([visit[k] for k in some if k >= 0], dtype=np.int64) for some in ids
+        )
+        goes_on = np.isin(paused, visits.graph.pred)
+        unsure = {*lost.tolist(), *paused[goes_on].tolist()}
         rows = np.array(sorted(k for k in unsure if k >= 0), dtype=np.int64)
         rule = visits.zone.rule[rows]
         exact = (rule == ZoneRule.PASS) | (visits.zone.size_mm[rows] < 0.0)
