@@ -53,7 +53,8 @@ class BestPoints:
         for v, tried in _list_tried(now).items():
             known = best.setdefault(v, tried)
             if v not in bad and tried.size <= known.size + BETTER:  # the later one
-                best[v] = replace(tried, size=min(tried.size, known.size))
+                farther = tried.size > known.size
+                best[v] = replace(tried, size=known.size) if farther else tried
         return BestPoints(best, {**now.refusals, **self.refused})
 
     def restore(self, now: PathPrediction) -> InsertionPlan:

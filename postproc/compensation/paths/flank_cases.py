@@ -203,7 +203,7 @@ class OpenSides:
         """List the gaps that the hypotheses of each joint let it go over."""
         found = []
         for flank in self.flanks:
-            kinds = [kind for kind in _WIDE if flank.is_open(kind)]
+            kinds = [kind for kind in flank.open_kinds if kind in _WIDE]
             found.append([width for kind in kinds for width in _widths_of(flank, kind)])
         return found
 
