@@ -49,7 +49,7 @@ class FlankCase:
         weight: Of the hypothesis; 1 where a flank is not known.
         rows: The samples at which it makes a difference, (k,), ascending.
         across: Distance from the path there, (k,) [m].
-        moved: How far the TCP is from where it is predicted there, (k,) [m].
+        by: From where the TCP is predicted there to where it is, (k, 3) [m].
     """
 
     joint: int
@@ -57,7 +57,7 @@ class FlankCase:
     weight: float
     rows: Ints
     across: Floats
-    moved: Floats
+    by: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ class FlankCases:
         there = self.off[at] + by
         along = np.einsum("si,si->s", there, self.tangent[at])
         across = lengths(there - along[:, None] * self.tangent[at])
-        return FlankCase(joint, kind, weight, at, across, lengths(by))
+        return FlankCase(joint, kind, weight, at, across, by)
 
     def _all_of(self, kind: FlankKind, by: Floats) -> Iterator[FlankCase]:
         """Yield the case of all links that run on at stops; they have one cause.
@@ -148,6 +148,10 @@ class FlankCases:
     @cached_property
     def _flanks(self) -> tuple[FlankOfJoint, ...]:
         return flanks_of(self.error.model, self.error.cell.arm)
+
+    def predict(self, rows: Ints, side: Floats) -> Floats:
+        """Predict the error at samples (k,) with joints on other sides, (k, 3) [m]."""
+        return self.error(self.run, rows, side)
 
     def _moves_of(self, joint: int, rows: Ints) -> Floats:
         """Return what the TCP moves from the middle to the upper flank, (k, 3) [m]."""

@@ -35,6 +35,7 @@ from postproc.compensation.paths.plan_outcomes import (
     Predicted,
     Rows,
     compare,
+    expect_better,
 )
 from postproc.compensation.paths.split_constraints import (
     hindrances,
@@ -241,6 +242,22 @@ class InsertionTask:
         found = compare([plan.predicted for plan in plans], new, self.tolerance)
         self._compared.update((key, found[key[0]]) for key in keys if key[0] in found)
         return {key[0]: self._compared[key] for key in keys}
+
+    def expect_halves(
+        self, now: PathPrediction, compared: Mapping[Rows, MoveOutcomes]
+    ) -> list[Rows]:
+        """List the moves for which half of a correction may be the better plan.
+
+        Args:
+            now: The program with points that correct all.
+            compared: How its moves do with these and with other plans.
+        """
+        lines: dict[Rows, MoveOutcomes] = {
+            rows: one for rows, one in compared.items() if len(rows) == 1
+        }
+        moved = self.sides.moved_by_half(now.plan, [rows[0] for rows in lines])
+        better = {*expect_better(now.predicted, moved, lines)}
+        return [rows for rows in compared if rows not in lines or rows in better]
 
     @cached_property
     def _source(self) -> Part:

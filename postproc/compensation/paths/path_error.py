@@ -108,6 +108,13 @@ class PathAccuracy:
         """Return the samples of the path to a visit."""
         return self.samples(self.row_of(visit))
 
+    def sample_at(self, visit: int, shares: Sequence[float]) -> Ints:
+        """Return the samples at shares (k,) of the way to a visit, (k,)."""
+        rows = self.samples_to(visit)
+        way = self.way[rows]
+        at = np.searchsorted(way, np.array(shares) * way[-1])
+        return np.asarray(rows.start + at.clip(0, len(way) - 1))
+
     def spans_to(self, visits: Ints) -> tuple[Ints, Ints]:
         """Return where the samples of the paths to visits begin, and how many, (k,)."""
         rows = np.searchsorted(self.visit, visits)
@@ -183,7 +190,7 @@ def _gather_columns(
 ) -> dict[str, Any]:
     """Return rows of columns, the parts one after the other."""
     return {
-        name: np.concatenate([getattr(part, name) for part in parts])[rows]
+        name: np.concatenate([getattr(part, name) for part in parts]).take(rows, axis=0)
         for name in names
     }
 
@@ -324,12 +331,9 @@ def apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
 
 def _uncertain_share(run: AlongWays, error: ErrorAlong) -> Floats:
     """Half of what flanks that are not known make, all joints added up, (s,) [m]."""
-    out = np.zeros(len(run.least))
-    for joint in range(6):
-        open_ = run.most[:, joint] - run.least[:, joint] > UNSURE
-        rows = np.flatnonzero(open_)
-        if not len(rows):
-            continue
+    out, open_ = np.zeros(len(run.least)), run.most - run.least > UNSURE
+    for joint in np.flatnonzero(open_.any(axis=0)).tolist():
+        rows = np.flatnonzero(open_[:, joint])
         low, high = np.array([run.side[rows]] * 2)
         low[:, joint], high[:, joint] = run.least[rows, joint], run.most[rows, joint]
         out[rows] += lengths(error(run, rows, high) - error(run, rows, low)) / 2

@@ -74,16 +74,18 @@ def choose_plan(
         Which plan, and its promise [m].
     """
     step, open_ = resolution(tolerance), weight > OPEN
-    promise = [_promise(plan, open_, step) for plan in plans]
-    expected = [float(plan.off @ weight) for plan in plans]
-    most = tolerable_harm(tolerance)
-    fit = [k for k, plan in enumerate(plans) if not (plan.worse[open_] > most).any()]
+    off, worse = (
+        np.array([getattr(plan, name) for plan in plans]) for name in ("off", "worse")
+    )
+    worst, harm = (own[:, open_].max(axis=1, initial=0.0) for own in (off, worse))
+    promise = [_in_steps(most, step) for most in worst.tolist()]
+    expected = (off * weight).sum(axis=1).tolist()
+    fit = np.flatnonzero(harm <= tolerable_harm(tolerance)).tolist()
     best = min(fit, key=lambda k: (promise[k], expected[k]))
     return best, promise[best]
 
 
-def _promise(plan: PlanOutcome, open_: Bools, step: float) -> float:
-    worst = float(plan.off[open_].max(initial=0.0))
+def _in_steps(worst: float, step: float) -> float:
     return float(np.ceil(np.round(worst / step, 6))) * step
 
 

@@ -97,7 +97,8 @@ def _try_plans(
 ) -> Iterator[tuple[Rows, MoveOutcomes, list[InsertionPlan]]]:
     """Yield every move with points, how it does without and by some plans, and these.
 
-    Half is looked at where nothing else keeps the finest promise.
+    Half is looked at where nothing else keeps the finest promise, and it is expected to
+    do better.
     """
     task, made = now.task, [now]
     if now.plan.stops:
@@ -105,8 +106,8 @@ def _try_plans(
     moves = task.compare(made, _moves_with_points(now))
     finest, halved = resolution(task.tolerance), dict[Rows, MoveOutcomes]()
     if any(flank.open_kinds for flank in task.flanks):
-        open_ = [rows for rows, own in moves.items() if own.choice[1] > finest]
-        plain = made[-1].plan
+        rough = {rows: own for rows, own in moves.items() if own.choice[1] > finest}
+        plain, open_ = made[-1].plan, task.expect_halves(made[-1], rough)
         own = plain.points.keys() & {v for rows in open_ for v in rows}
         made.append(task.predict(replace(plain, halved=frozenset(own))))
         halved = task.compare(made, open_)
