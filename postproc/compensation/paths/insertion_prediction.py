@@ -11,7 +11,6 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.options import Job
-from postproc.compensation.outcome import Status
 from postproc.compensation.paths import changed_windows
 from postproc.compensation.paths.arcs import (
     STRAIGHT,
@@ -253,11 +252,13 @@ class InsertionTask:
             compared: How its moves do with these and with other plans.
         """
         lines: dict[Rows, MoveOutcomes] = {
-            rows: one for rows, one in compared.items() if len(rows) == 1
+            rows: one
+            for rows, one in compared.items()
+            if len(rows) == 1 and rows[0] in now.plan.points
         }
+        arcs = [rows for rows in compared if len(rows) > 1]
         moved = self.sides.moved_by_half(now.plan, [rows[0] for rows in lines])
-        better = {*expect_better(now.predicted, moved, lines)}
-        return [rows for rows in compared if rows not in lines or rows in better]
+        return [*arcs, *expect_better(now.predicted, moved, lines)]
 
     @cached_property
     def _source(self) -> Part:
@@ -494,19 +495,11 @@ class PathPrediction:
     @cached_property
     def refusals(self) -> dict[int, str]:
         """Say why points of moves cannot be corrected, by visit, of those alone."""
-        return {v: why for v in self.plan.points if (why := self._refusal(v))}
-
-    def _refusal(self, v: int) -> str:
-        part = self.part_of(v)
-        decided, rows = part.decisions, part.rows_on_way(v)
-        left = rows[decided.status[rows] != Status.CORRECTED]
-        if len(left):
-            why = decided.reasons[decided.why[left[0]]]
-            return f"points inserted into it cannot be corrected: {why}"
-        visits = part.visits
-        passed = rows[~visits.motion.via[rows]][v in self.plan.stops :]
-        sized = visits.motion.fly[passed] & (visits.zone.size_mm[passed] > 0.0)
-        return "" if sized.all() else self.task.splitter.unsized
+        stops, unsized = self.plan.stops, self.task.splitter.unsized
+        told = {
+            v: self.part_of(v).refuse(v, v in stops, unsized) for v in self.plan.points
+        }
+        return {v: why for v, why in told.items() if why}
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""

@@ -90,6 +90,8 @@ class PlanSides:
             path is moved by there, (k, 3) [m].
         """
         paths, points = self.first.paths, [plan.points[v] for v in moves]
+        if not moves:
+            return []
         assert paths.cases is not None
         at = [paths.sample_at(v, own) for v, own in zip(moves, points, strict=True)]
         halved = replace(plan, halved=frozenset(moves))
