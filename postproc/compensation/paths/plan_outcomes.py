@@ -20,6 +20,7 @@ from postproc.compensation.paths.path_error import (
 from postproc.compensation.paths.plan_rule import (
     PlanOutcome,
     choose_plan,
+    choose_plans,
     negligible,
     tolerable_harm,
 )
@@ -84,6 +85,7 @@ class MoveOutcomes:
         weight: (h,).
         tolerance: Of paths [m].
         largest: How far the last plan leaves the path at the most, (h,) [m].
+        choice: The plan that is chosen, see `choose_plan`, and its promise [m].
     """
 
     plans: tuple[PlanOutcome, ...]
@@ -92,16 +94,12 @@ class MoveOutcomes:
     weight: Floats
     tolerance: float
     largest: Floats
+    choice: tuple[int, float]
 
     @property
     def worst(self) -> float:
         """Return how far the last plan leaves the path by any open hypothesis [m]."""
         return float(self.largest[self.weight > OPEN].max())
-
-    @cached_property
-    def choice(self) -> tuple[int, float]:
-        """The plan that is chosen, see `choose_plan`, and its promise [m]."""
-        return choose_plan(self.plans, self.weight, self.tolerance)
 
     def would_choose(self, off: Floats) -> bool:
         """Return True if one more plan were chosen that harms none, (h,) [m]."""
@@ -169,6 +167,8 @@ def compare(
                 worse[p, rows, k], share[p, rows, k] = harm
         largest[rows, k] = found[-1].measure_largest(hypothesis, rows)
     weight = _weigh(found, keys, there)
+    best, promise = choose_plans(off, worse, np.where(there, weight, 0.0), tolerance)
+    choices = [*zip(best.tolist(), promise.tolist(), strict=True)]
     return {
         rows: MoveOutcomes(
             tuple(map(PlanOutcome, off[:, m, own], worse[:, m, own])),
@@ -177,6 +177,7 @@ def compare(
             weight[m, own],
             tolerance,
             largest[m, own],
+            choices[m],
         )
         for m, (rows, own) in enumerate(zip(moves, there, strict=True))
     }
