@@ -318,6 +318,7 @@ class InsertionTask:
             in_time = run_in_time(
                 reading, again, kept.position, self.setting, owner,
                 self.list_wanted_arcs(plan), self.corners.at(own, len(owner)),
+                self.first.paths,
             )  # fmt: skip
         return Part(reading.visits, kept, in_time, own)
 
