@@ -257,8 +257,8 @@ class InsertionTask:
             if len(rows) == 1 and rows[0] in now.plan.points
         }
         arcs = [rows for rows in compared if len(rows) > 1]
-        moved = self.sides.moved_by_half(now.plan, [rows[0] for rows in lines])
-        return [*arcs, *expect_better(now.predicted, moved, lines)]
+        shifts = self.sides.half_shifts(now.plan, [rows[0] for rows in lines])
+        return [*arcs, *expect_better(now.predicted, shifts, lines)]
 
     @cached_property
     def _source(self) -> Part:

@@ -74,7 +74,7 @@ class PlanSides:
         self._known.update(self._mean(new))
         return {v: self._known[key] for v, key in keys.items()}
 
-    def moved_by_half(
+    def half_shifts(
         self, plan: InsertionPlan, moves: Sequence[int]
     ) -> list[tuple[Floats, Floats]]:
         """Say by what lines are moved if their points correct half of what flanks do.

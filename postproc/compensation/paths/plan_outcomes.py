@@ -185,7 +185,7 @@ def compare(
 
 def expect_better(
     plan: Predicted,
-    moved: Sequence[tuple[Floats, Floats]],
+    shifts: Sequence[tuple[Floats, Floats]],
     compared: Mapping[Rows, MoveOutcomes],
 ) -> list[Rows]:
     """List the moves that may do best with their points elsewhere, if that harms none.
@@ -194,13 +194,13 @@ def expect_better(
 
     Args:
         plan: The program with the points where they are.
-        moved: Shares of the way of each move, (k,), ascending from 0 to 1, and by what
+        shifts: Shares of the way of each move, (k,), ascending from 0 to 1, and by what
             the path is moved there, (k, 3) [m].
         compared: How these moves, to one visit each, do with the plans that are known.
     """
     if not compared:
         return []
-    other = _PlannedMoves.of(plan, [*compared]).moved(moved)
+    other = _PlannedMoves.of(plan, [*compared]).shift(shifts)
     keys = [None, *{key for one in compared.values() for key in one.keys}]
     every = np.arange(len(compared))
     off = {key: other.measure_off(key, every) - ALMOST for key in keys}
@@ -304,7 +304,7 @@ class _PlannedMoves:
         begin = np.cumsum([0, *map(len, moves)])
         return cls(way, off, tangent, across, first, begin, cases, weights, usually)
 
-    def moved(self, by: Sequence[tuple[Floats, Floats]]) -> _PlannedMoves:
+    def shift(self, by: Sequence[tuple[Floats, Floats]]) -> _PlannedMoves:
         """Return them with the TCP elsewhere, see `expect_better`."""
         count, ways = np.diff(self.first), np.arange(len(self.first) - 1)
         whole = np.repeat(self.way[self.first[1:] - 1], count)
