@@ -278,6 +278,7 @@ def run_in_time(
     owner: Ints | None = None,
     arcs: WantedArcs = NO_ARCS,
     corners: SourceCorners | None = None,
+    source: PathAccuracy | None = None,
 ) -> InTime:
     """Run a program in time, as it was written and as it is compensated.
 
@@ -290,6 +291,7 @@ def run_in_time(
             were put on ways.
         arcs: The arcs of the source that were cut.
         corners: How the source passes the visits; None: as the program does.
+        source: What tells of the program as it was written; None: that is predicted.
     """
     cell = setting.cell
     before, after = (run_visits(part.visits, cell) for part in (reading, again))
@@ -297,7 +299,7 @@ def run_in_time(
     shift = np.nan_to_num(position + before.path.aside - passed)
     paths = predict_paths(
         before, after, shift, cell, setting.model, setting.temperature, owner, arcs,
-        corners,
+        corners, source,
     )  # fmt: skip
     guessed, told = list_guessed_limits(cell.arm), setting.model.in_motion
     return InTime(before, after, paths, guessed, cell.arm, in_motion=told)

@@ -67,6 +67,8 @@ def on_the_way(side: Floats | float, width: Floats | float) -> Floats:
         -1 on one flank, 1 on the other.
     """
     side = np.asarray(np.clip(side, -1.0, 1.0))
+    if np.all(np.less_equal(width, 1.0)):
+        return side
     between = np.greater(width, 1.0) & (np.abs(side) < 1.0)
     return np.sin(np.pi / 2 * side, where=between, out=side)
 

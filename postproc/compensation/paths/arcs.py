@@ -231,7 +231,7 @@ def zone_sizes(arm: Arm, cycle: ProgramCycle, targets: Targets) -> Floats:
     return size
 
 
-def measure_passing(zone: Floats, radius: float) -> Floats:
+def measure_passing(zone: Floats, radius: Floats) -> Floats:
     """Say how far a rounded point of an arc is passed because the arc bends [m].
 
     Two moves that are superposed are at a quarter of the zone from the point each.
@@ -275,9 +275,9 @@ class WantedArcs:
         """Return the number of their halves."""
         return len(self.owner)
 
-    def radius_of(self, visit: int) -> float:
-        """Return the radius of the arc that a visit of the source is of [m]."""
-        return float(self.radius[np.searchsorted(self.owner, visit)])
+    def radius_of(self, visits: Ints) -> Floats:
+        """Return the radii of the arcs that visits of the source are of, (k,) [m]."""
+        return np.asarray(self.radius[np.searchsorted(self.owner, visits)])
 
     def off(self, place: Floats, owner: Ints, rows: Bools) -> Floats:
         """Return how far places are from their arcs, (s, 3) [m].

@@ -53,7 +53,8 @@ class BestPoints:
         for v, tried in _list_tried(now).items():
             known = best.setdefault(v, tried)
             if v not in bad and tried.size <= known.size + BETTER:  # the later one
-                best[v] = replace(tried, size=min(tried.size, known.size))
+                farther = tried.size > known.size
+                best[v] = replace(tried, size=known.size) if farther else tried
         return BestPoints(best, {**now.refusals, **self.refused})
 
     def restore(self, now: PathPrediction) -> InsertionPlan:
@@ -87,10 +88,8 @@ def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
     for cut in plan.chords:
         chords.setdefault(cut[0], []).append(cut)
     for own in {halves(now.task.visits, v) for v in plan.open}:
-        found[own[0]] = _Tried(
-            hypot(*(sizes.get(row, np.inf) for row in own)),
-            {row: plan.points[row] for row in own if row in plan.points},
-            plan.stops.intersection(own),
-            frozenset(cut for row in own for cut in chords.get(row, ())),
-        )
+        size = hypot(*[sizes.get(row, np.inf) for row in own])
+        points = {row: plan.points[row] for row in own if row in plan.points}
+        cuts = frozenset(cut for row in own for cut in chords.get(row, ()))
+        found[own[0]] = _Tried(size, points, plan.stops.intersection(own), cuts)
     return found

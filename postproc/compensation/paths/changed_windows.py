@@ -8,7 +8,7 @@ an earlier stop, behind which every joint has turned farther than its gap is wid
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.options import Job
-from postproc.compensation.outcome import Decisions
+from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.pipeline import WindowResult
@@ -58,6 +58,7 @@ class Part:
     kept: WindowResult
     in_time: InTime
     own: Ints
+    _refused: dict[tuple[int, bool], str] = field(default_factory=dict, repr=False)
 
     @property
     def decisions(self) -> Decisions:
@@ -94,6 +95,28 @@ class Part:
         there = _lie_in_play(source, visits, travels)
         alike = np.isclose(here, there, rtol=0.0, atol=ALIKE, equal_nan=True)
         return np.asarray(alike.all(axis=1))
+
+    def refuse(self, v: int, stops: bool, unsized: str) -> str:
+        """Say why points of a move cannot be corrected, "" where they can.
+
+        Args:
+            v: The move.
+            stops: Its first point is a stop.
+            unsized: Why points stay out whose blending is not known.
+        """
+        if (v, stops) not in self._refused:
+            self._refused[v, stops] = self._refuse(v, stops, unsized)
+        return self._refused[v, stops]
+
+    def _refuse(self, v: int, stops: bool, unsized: str) -> str:
+        decided, rows, visits = self.decisions, self.rows_on_way(v), self.visits
+        left = rows[decided.status[rows] != Status.CORRECTED]
+        if len(left):
+            why = decided.reasons[decided.why[left[0]]]
+            return f"points inserted into it cannot be corrected: {why}"
+        passed = rows[~visits.motion.via[rows]][stops:]
+        sized = visits.motion.fly[passed] & (visits.zone.size_mm[passed] > 0.0)
+        return "" if sized.all() else unsized
 
     def rows_on_way(self, v: int) -> Ints:
         """Return its visits on the way to a visit of the source, without that."""

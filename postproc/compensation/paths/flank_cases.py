@@ -49,7 +49,7 @@ class FlankCase:
         weight: Of the hypothesis; 1 where a flank is not known.
         rows: The samples at which it makes a difference, (k,), ascending.
         across: Distance from the path there, (k,) [m].
-        moved: How far the TCP is from where it is predicted there, (k,) [m].
+        by: From where the TCP is predicted there to where it is, (k, 3) [m].
     """
 
     joint: int
@@ -57,7 +57,7 @@ class FlankCase:
     weight: float
     rows: Ints
     across: Floats
-    moved: Floats
+    by: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +88,14 @@ class FlankCases:
         open_ = self.open_sides()
         for joint in range(len(self._flanks)):
             sides = [*open_.of(joint)]
-            rows = [np.flatnonzero(np.abs(own - self.run.side[:, joint]) > CHANGED)
+            usual = open_.usual[:, joint]
+            rows = [np.flatnonzero(np.abs(own - usual) > CHANGED)
                     for _, _, own in sides]  # fmt: skip
             every = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
             moves = np.empty((len(self.off), 3))
             moves[every] = self._moves_of(joint, every)
             for (kind, weight, own), at in zip(sides, rows, strict=True):
-                by = (own - self.run.side[:, joint])[at, None] * moves[at]
+                by = (own[at] - usual[at])[:, None] * moves[at]
                 if len(at):
                     found.append(self._case(joint + 1, kind, weight, at, by))
                 if kind in together:
@@ -113,7 +114,7 @@ class FlankCases:
         there = self.off[at] + by
         along = np.einsum("si,si->s", there, self.tangent[at])
         across = lengths(there - along[:, None] * self.tangent[at])
-        return FlankCase(joint, kind, weight, at, across, lengths(by))
+        return FlankCase(joint, kind, weight, at, across, by)
 
     def _all_of(self, kind: FlankKind, by: Floats) -> Iterator[FlankCase]:
         """Yield the case of all links that run on at stops; they have one cause.
@@ -149,6 +150,10 @@ class FlankCases:
     def _flanks(self) -> tuple[FlankOfJoint, ...]:
         return flanks_of(self.error.model, self.error.cell.arm)
 
+    def predict(self, rows: Ints, side: Floats) -> Floats:
+        """Predict the error at samples (k,) with joints on other sides, (k, 3) [m]."""
+        return self.error(self.run, rows, side)
+
     def _moves_of(self, joint: int, rows: Ints) -> Floats:
         """Return what the TCP moves from the middle to the upper flank, (k, 3) [m]."""
         ends = np.array([self.run.side[rows]] * 2)
@@ -174,7 +179,7 @@ class OpenSides:
 
     def of(self, joint: int) -> Iterator[tuple[FlankKind, float, Floats]]:
         """Yield the sides (s,) of a joint (from 0), hypotheses, and their weights."""
-        flank, usual = self.flanks[joint], self.run.side[:, joint]
+        flank, usual = self.flanks[joint], self.usual[:, joint]
         for kind in flank.open_kinds:
             weight = flank.weight[kind]
             if kind in _WIDE:
@@ -199,11 +204,16 @@ class OpenSides:
         return self._all_over[self._widths[joint].index(width)][:, joint]
 
     @cached_property
+    def usual(self) -> Floats:
+        """The sides as predicted, (s, 6), joint by joint in memory as all here."""
+        return np.asfortranarray(self.run.side)
+
+    @cached_property
     def _widths(self) -> list[list[float]]:
         """List the gaps that the hypotheses of each joint let it go over."""
         found = []
         for flank in self.flanks:
-            kinds = [kind for kind in _WIDE if flank.is_open(kind)]
+            kinds = [kind for kind in flank.open_kinds if kind in _WIDE]
             found.append([width for kind in kinds for width in _widths_of(flank, kind)])
         return found
 
@@ -211,13 +221,14 @@ class OpenSides:
     def _all_over(self) -> list[Floats]:
         """The sides of all joints, each over the k-th of its gaps, (s, 6) each."""
         columns = zip_longest(*self._widths, fillvalue=1.0)
-        cell = self.error.cell
-        return [self.run.over(cell, np.array(width)).side for width in columns]
+        found = (self.run.over(self.error.cell, np.array(width)) for width in columns)
+        return [np.asfortranarray(one.side) for one in found]
 
     @cached_property
     def _ran_on(self) -> Floats:
         """The sides of all joints whose links ran on at fast stops, (s, 6)."""
-        return self.run.run_on(self.error.cell, nominal_widths(self.flanks))
+        sides = self.run.run_on(self.error.cell, nominal_widths(self.flanks))
+        return np.asfortranarray(sides)
 
     @cached_property
     def _move(self) -> Ints:

@@ -160,6 +160,8 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
     plan, room = now.plan, now.room
     whole = whole_arcs(now)
     for v in now.worst_first:
+        if plan.crowded and room <= 0:
+            break
         if not _needs_points(now, v, now.sizes[v]):
             continue
         via = v in whole  # the point on the way of an arc becomes one, too

@@ -11,7 +11,6 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.options import Job
-from postproc.compensation.outcome import Status
 from postproc.compensation.paths import changed_windows
 from postproc.compensation.paths.arcs import (
     STRAIGHT,
@@ -35,6 +34,7 @@ from postproc.compensation.paths.plan_outcomes import (
     Predicted,
     Rows,
     compare,
+    expect_better,
 )
 from postproc.compensation.paths.split_constraints import (
     hindrances,
@@ -242,6 +242,24 @@ class InsertionTask:
         self._compared.update((key, found[key[0]]) for key in keys if key[0] in found)
         return {key[0]: self._compared[key] for key in keys}
 
+    def expect_halves(
+        self, now: PathPrediction, compared: Mapping[Rows, MoveOutcomes]
+    ) -> list[Rows]:
+        """List the moves for which half of a correction may be the better plan.
+
+        Args:
+            now: The program with points that correct all.
+            compared: How its moves do with these and with other plans.
+        """
+        lines: dict[Rows, MoveOutcomes] = {
+            rows: one
+            for rows, one in compared.items()
+            if len(rows) == 1 and rows[0] in now.plan.points
+        }
+        arcs = [rows for rows in compared if len(rows) > 1]
+        shifts = self.sides.half_shifts(now.plan, [rows[0] for rows in lines])
+        return [*arcs, *expect_better(now.predicted, shifts, lines)]
+
     @cached_property
     def _source(self) -> Part:
         own = np.arange(len(self.visits))
@@ -300,6 +318,7 @@ class InsertionTask:
             in_time = run_in_time(
                 reading, again, kept.position, self.setting, owner,
                 self.list_wanted_arcs(plan), self.corners.at(own, len(owner)),
+                self.first.paths,
             )  # fmt: skip
         return Part(reading.visits, kept, in_time, own)
 
@@ -477,19 +496,11 @@ class PathPrediction:
     @cached_property
     def refusals(self) -> dict[int, str]:
         """Say why points of moves cannot be corrected, by visit, of those alone."""
-        return {v: why for v in self.plan.points if (why := self._refusal(v))}
-
-    def _refusal(self, v: int) -> str:
-        part = self.part_of(v)
-        decided, rows = part.decisions, part.rows_on_way(v)
-        left = rows[decided.status[rows] != Status.CORRECTED]
-        if len(left):
-            why = decided.reasons[decided.why[left[0]]]
-            return f"points inserted into it cannot be corrected: {why}"
-        visits = part.visits
-        passed = rows[~visits.motion.via[rows]][v in self.plan.stops :]
-        sized = visits.motion.fly[passed] & (visits.zone.size_mm[passed] > 0.0)
-        return "" if sized.all() else self.task.splitter.unsized
+        stops, unsized = self.plan.stops, self.task.splitter.unsized
+        told = {
+            v: self.part_of(v).refuse(v, v in stops, unsized) for v in self.plan.points
+        }
+        return {v: why for v, why in told.items() if why}
 
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""

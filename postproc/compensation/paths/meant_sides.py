@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -74,6 +74,39 @@ class PlanSides:
         self._known.update(self._mean(new))
         return {v: self._known[key] for v, key in keys.items()}
 
+    def half_shifts(
+        self, plan: InsertionPlan, moves: Sequence[int]
+    ) -> list[tuple[Floats, Floats]]:
+        """Say by what lines are moved if their points correct half of what flanks do.
+
+        That is what the arm's error changes by between the sides that are meant.
+
+        Args:
+            plan: The points.
+            moves: The lines.
+
+        Returns:
+            For each both its ends and its points, shares of the way, (k,), and what the
+            path is moved by there, (k, 3) [m].
+        """
+        paths, points = self.first.paths, [plan.points[v] for v in moves]
+        if not moves:
+            return []
+        assert paths.cases is not None
+        at = [paths.sample_at(v, own) for v, own in zip(moves, points, strict=True)]
+        halved = replace(plan, halved=frozenset(moves))
+        whole, half = (
+            paths.cases.predict(
+                np.concatenate(at), np.concatenate([meant[v].side for v in moves])
+            )
+            for meant in map(self.of_plan, (replace(plan, halved=frozenset()), halved))
+        )
+        by = np.split(whole - half, np.cumsum([len(own) for own in at])[:-1])
+        return [
+            (np.array([0.0, *own, 1.0]), np.pad(moved, ((1, 1), (0, 0))))
+            for own, moved in zip(points, by, strict=True)
+        ]
+
     def _cross_on(self, moves: Sequence[tuple[int, ...]]) -> None:
         """Let sharp joints cross their gaps on moves where they begin to."""
         if not moves:
@@ -95,12 +128,8 @@ class PlanSides:
         own, side = [paths.samples_to(v) for v in move], self._sides[move]
         if half:
             side = (side + _evenly(side, [paths.way[rows] for rows in own])) / 2
-        samples = dict(zip(move, own, strict=True))
         for key in keys:
-            rows = samples[key[0]]
-            way = paths.way[rows]
-            ends = np.array([0.0, *key[1], 1.0]) * way[-1]
-            at = rows.start + np.searchsorted(way, ends).clip(0, len(way) - 1)
+            at = paths.sample_at(key[0], (0.0, *key[1], 1.0))
             there = side[at - own[0].start]
             yield _PointsOnWay(key, paths.q[at], there, there - side[0])
 

@@ -108,10 +108,47 @@ class PathAccuracy:
         """Return the samples of the path to a visit."""
         return self.samples(self.row_of(visit))
 
+    def sample_at(self, visit: int, shares: Sequence[float]) -> Ints:
+        """Return the samples at shares (k,) of the way to a visit, (k,)."""
+        rows = self.samples_to(visit)
+        way = self.way[rows]
+        at = np.searchsorted(way, np.array(shares) * way[-1])
+        return np.asarray(rows.start + at.clip(0, len(way) - 1))
+
     def spans_to(self, visits: Ints) -> tuple[Ints, Ints]:
         """Return where the samples of the paths to visits begin, and how many, (k,)."""
-        rows = np.searchsorted(self.visit, visits)
+        rows = self.rows_of(visits)
         return self.first[rows], self.first[rows + 1] - self.first[rows]
+
+    def as_written(self, other: PathAccuracy) -> PathAccuracy:
+        """Let another prediction tell what this one does of the program as written.
+
+        Of each of its samples the one here tells that lies nearest along the path.
+
+        Args:
+            other: A prediction of some of the paths, at other samples.
+        """
+        start, count = self.spans_to(other.visit)
+        number, rows = np.arange(len(count)), self.rows_of(other.visit)
+        way, first = self.way[spans(start, count)], np.cumsum(count) - count
+        whole = way[first + count - 1]
+        apart_ = 1.0 + float(max(way.max(initial=0.0), other.way.max(initial=0.0)))
+        there = way + apart_ * np.repeat(number, count)
+        own = np.repeat(number, np.diff(other.first))
+        here = np.minimum(other.way, whole[own]) + apart_ * own
+        at = np.searchsorted((there[1:] + there[:-1]) / 2, here)
+        at = at.clip(first[own], (first + count - 1)[own]) + (start - first)[own]
+        top = there[self.before.largest[rows] - start + first]
+        largest = np.searchsorted(here, top).clip(other.first[:-1], other.first[1:] - 1)
+        told = {name: getattr(self.before, name).take(at, axis=0)
+                for name in ("off", "across", "along", "unsure")}  # fmt: skip
+        told["across"][largest] = self.before.sizes[rows]
+        before = Deviations(**told, largest=largest, shares=self.before.shares[rows])
+        return replace(other, before=before)
+
+    def rows_of(self, visits: Ints) -> Ints:
+        """Return which paths lead to visits, (k,)."""
+        return np.searchsorted(self.visit, visits)
 
     def row_of(self, visit: int) -> int:
         """Return which path leads to a visit."""
@@ -183,7 +220,7 @@ def _gather_columns(
 ) -> dict[str, Any]:
     """Return rows of columns, the parts one after the other."""
     return {
-        name: np.concatenate([getattr(part, name) for part in parts])[rows]
+        name: np.concatenate([getattr(part, name) for part in parts]).take(rows, axis=0)
         for name in names
     }
 
@@ -203,6 +240,7 @@ def predict_paths(
     owner: Ints | None = None,
     arcs: WantedArcs = NO_ARCS,
     corners: SourceCorners | None = None,
+    source: PathAccuracy | None = None,
 ) -> PathAccuracy:
     """Predict how far a program leaves its paths, as written and as compensated.
 
@@ -218,13 +256,14 @@ def predict_paths(
             were inserted on its way; each move is then one path.
         arcs: The arcs of the source that were cut.
         corners: How the source passes the visits; None: as the program does.
+        source: What tells of the program as it was written; None: that is predicted.
     """
     cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
     cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
     pair = _ways(cell, model, cycles, rows, tools)
-    runs = [AlongWays.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
+    run = AlongWays.of(cell, model, after, pair[1])
     error = ErrorAlong(cell, model, temperature)
     tools = tools[pair[0].way]
     wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
@@ -240,18 +279,22 @@ def predict_paths(
         moved += arcs.off(wanted, owner[ways.visit][ways.way], on_arc)
         if corners is not None:
             moved += corners.off(cell.arm, before, ways, way)
+    told, side = _deviations(run, error, moved, tangent, way), run.side
+    usual = told
+    if source is None:
+        written = AlongWays.of(cell, model, before, pair[0])
+        usual, side = _deviations(written, error, -off, tangent, way), written.side
     found = PathAccuracy(
-        rows, pair[0].first, way, tangent,
-        _deviations(runs[0], error, -off, tangent, way),
-        _deviations(runs[1], error, moved, tangent, way),
-        int((cartesian & ~known).sum()), pair[0].q, runs[0].side,
+        rows, pair[0].first, way, tangent, usual, told,
+        int((cartesian & ~known).sum()), pair[0].q, side,
     )  # fmt: skip
     if owner is None or not len(rows):
         return found
     found = found.join(owner)
     off = found.after.off
-    cases = FlankCases(runs[1], error, off, tangent, found.way, found.first)
-    return replace(found, cases=cases)
+    cases = FlankCases(run, error, off, tangent, found.way, found.first)
+    found = replace(found, cases=cases)
+    return found if source is None else source.as_written(found)
 
 
 def _ways(
@@ -324,12 +367,9 @@ def apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
 
 def _uncertain_share(run: AlongWays, error: ErrorAlong) -> Floats:
     """Half of what flanks that are not known make, all joints added up, (s,) [m]."""
-    out = np.zeros(len(run.least))
-    for joint in range(6):
-        open_ = run.most[:, joint] - run.least[:, joint] > UNSURE
-        rows = np.flatnonzero(open_)
-        if not len(rows):
-            continue
+    out, open_ = np.zeros(len(run.least)), run.most - run.least > UNSURE
+    for joint in np.flatnonzero(open_.any(axis=0)).tolist():
+        rows = np.flatnonzero(open_[:, joint])
         low, high = np.array([run.side[rows]] * 2)
         low[:, joint], high[:, joint] = run.least[rows, joint], run.most[rows, joint]
         out[rows] += lengths(error(run, rows, high) - error(run, rows, low)) / 2

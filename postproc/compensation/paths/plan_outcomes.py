@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,18 +12,24 @@ import numpy as np
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.paths.flank_cases import Key
-from postproc.compensation.paths.path_error import PathAccuracy, largest_in
+from postproc.compensation.paths.path_error import (
+    PathAccuracy,
+    apart,
+    largest_in,
+)
 from postproc.compensation.paths.plan_rule import (
     PlanOutcome,
     choose_plan,
+    choose_plans,
     negligible,
     tolerable_harm,
 )
 from postproc.model.flank_hypotheses import OPEN, FlankKind
-from postproc.robot.pose import MM
+from postproc.robot.pose import MM, lengths
 
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
+ALMOST = 2e-6  # [m] to which what is expected of a plan holds
 LAST = 1.0 - 1e-9  # share of a way that is still on it
 
 
@@ -79,6 +85,7 @@ class MoveOutcomes:
         weight: (h,).
         tolerance: Of paths [m].
         largest: How far the last plan leaves the path at the most, (h,) [m].
+        choice: The plan that is chosen, see `choose_plan`, and its promise [m].
     """
 
     plans: tuple[PlanOutcome, ...]
@@ -87,16 +94,18 @@ class MoveOutcomes:
     weight: Floats
     tolerance: float
     largest: Floats
+    choice: tuple[int, float]
 
     @property
     def worst(self) -> float:
         """Return how far the last plan leaves the path by any open hypothesis [m]."""
         return float(self.largest[self.weight > OPEN].max())
 
-    @cached_property
-    def choice(self) -> tuple[int, float]:
-        """The plan that is chosen, see `choose_plan`, and its promise [m]."""
-        return choose_plan(self.plans, self.weight, self.tolerance)
+    def would_choose(self, off: Floats) -> bool:
+        """Return True if one more plan were chosen that harms none, (h,) [m]."""
+        plan = PlanOutcome(off, np.zeros(len(off)))
+        best, _ = choose_plan((*self.plans, plan), self.weight, self.tolerance)
+        return best == len(self.plans)
 
     def objection(self, plan: int) -> Objection | None:
         """Return which hypothesis makes a plan worse than no points.
@@ -158,6 +167,8 @@ def compare(
                 worse[p, rows, k], share[p, rows, k] = harm
         largest[rows, k] = found[-1].measure_largest(hypothesis, rows)
     weight = _weigh(found, keys, there)
+    best, promise = choose_plans(off, worse, np.where(there, weight, 0.0), tolerance)
+    choices = [*zip(best.tolist(), promise.tolist(), strict=True)]
     return {
         rows: MoveOutcomes(
             tuple(map(PlanOutcome, off[:, m, own], worse[:, m, own])),
@@ -166,9 +177,38 @@ def compare(
             weight[m, own],
             tolerance,
             largest[m, own],
+            choices[m],
         )
         for m, (rows, own) in enumerate(zip(moves, there, strict=True))
     }
+
+
+def expect_better(
+    plan: Predicted,
+    shifts: Sequence[tuple[Floats, Floats]],
+    compared: Mapping[Rows, MoveOutcomes],
+) -> list[Rows]:
+    """List the moves that may do best with their points elsewhere, if that harms none.
+
+    Expected is that paths go evenly from where one point has moved to the next one.
+
+    Args:
+        plan: The program with the points where they are.
+        shifts: Shares of the way of each move, (k,), ascending from 0 to 1, and by what
+            the path is moved there, (k, 3) [m].
+        compared: How these moves, to one visit each, do with the plans that are known.
+    """
+    if not compared:
+        return []
+    other = _PlannedMoves.of(plan, [*compared]).shift(shifts)
+    keys = [None, *{key for one in compared.values() for key in one.keys}]
+    every = np.arange(len(compared))
+    off = {key: other.measure_off(key, every) - ALMOST for key in keys}
+    return [
+        rows
+        for m, (rows, one) in enumerate(compared.items())
+        if one.would_choose(np.array([off[key][m] for key in (None, *one.keys)]))
+    ]
 
 
 def _weigh(found: Sequence[_PlannedMoves], keys: Sequence[Key], there: Bools) -> Floats:
@@ -189,26 +229,43 @@ def _weigh(found: Sequence[_PlannedMoves], keys: Sequence[Key], there: Bools) ->
     return weight
 
 
+class _Difference(NamedTuple):
+    """What a hypothesis makes of some ways, k samples.
+
+    Attributes:
+        rows: At which it makes a difference, (k,).
+        across: Distance from the path there, (k,) [m].
+        by: From where the TCP is predicted there to where it is, (k, 3) [m].
+    """
+
+    rows: Ints
+    across: Floats
+    by: Floats
+
+
 @dataclass(frozen=True)
 class _PlannedMoves:
     """The ways of m moves with one plan, s samples in all.
 
     Attributes:
         way: Path length since each way began, (s,) [m]; an arc has two ways.
-        across: Distance from the path as predicted, (s,) [m].
+        off: From the path to the TCP as predicted, (s, 3) [m].
+        tangent: Directions of the path, (s, 3).
+        across: Distance from the path, (s,) [m].
         first: The samples of way w are first[w] .. first[w + 1] - 1.
         begin: The ways of move k are begin[k] .. begin[k + 1] - 1, (m + 1,).
-        cases: Samples at which hypotheses make a difference, distances from the path
-            there [m], and how far the TCP is from where it is predicted [m].
+        cases: What hypotheses make of it.
         weights: Of the hypotheses.
         usually: Weight of what is predicted, of every joint, (6,).
     """
 
     way: Floats
+    off: Floats
+    tangent: Floats
     across: Floats
     first: Ints
     begin: Ints
-    cases: Mapping[Key, tuple[Ints, Floats, Floats]]
+    cases: Mapping[Key, _Difference]
     weights: Mapping[Key, float]
     usually: Floats
 
@@ -222,12 +279,15 @@ class _PlannedMoves:
             start[mine], count[mine] = plan.paths[k].spans_to(visits[mine])
         first = np.append(0, np.cumsum(count))
         way, across = np.empty((2, first[-1]))
-        told = dict[Key, list[tuple[Ints, Floats, Floats]]]()
+        off, tangent = np.empty((2, first[-1], 3))
+        told = dict[Key, list[_Difference]]()
         weights, usually = dict[Key, float](), np.ones(6)
         for k in np.unique(number).tolist():
             paths, mine = plan.paths[k], number == k
             here, there = (spans(at[mine], count[mine]) for at in (first[:-1], start))
             way[here], across[here] = paths.way[there], paths.after.across[there]
+            off[here] = paths.after.off.take(there, axis=0)
+            tangent[here] = paths.tangent.take(there, axis=0)
             if paths.cases is None:
                 continue
             usually, place = paths.cases.usually, np.full(len(paths.way), -1)
@@ -235,15 +295,30 @@ class _PlannedMoves:
             for key, case in paths.cases.by_key.items():
                 at = place[case.rows]
                 if (hit := at >= 0).any():
-                    one = at[hit], case.across[hit], case.moved[hit]
-                    told.setdefault(key, []).append(one)
+                    one = at[hit], case.across[hit], case.by[hit]
+                    told.setdefault(key, []).append(_Difference(*one))
                     weights[key] = case.weight
         cases = {}
         for key, some in told.items():
-            at, far, moved = map(np.concatenate, zip(*some, strict=True))
-            cases[key] = at, far, moved
+            cases[key] = _Difference(*map(np.concatenate, zip(*some, strict=True)))
         begin = np.cumsum([0, *map(len, moves)])
-        return cls(way, across, first, begin, cases, weights, usually)
+        return cls(way, off, tangent, across, first, begin, cases, weights, usually)
+
+    def shift(self, by: Sequence[tuple[Floats, Floats]]) -> _PlannedMoves:
+        """Return them with the TCP elsewhere, see `expect_better`."""
+        count, ways = np.diff(self.first), np.arange(len(self.first) - 1)
+        whole = np.repeat(self.way[self.first[1:] - 1], count)
+        share = np.minimum(self.way / np.maximum(whole, 1e-12), 1.0)
+        here = share + 2 * np.repeat(ways, count)
+        there = np.concatenate([own + 2 * k for k, (own, _) in enumerate(by)])
+        columns = np.concatenate([own for _, own in by]).T
+        off = self.off + np.stack([np.interp(here, there, c) for c in columns], axis=1)
+        cases = {}
+        for key, (rows, _, own) in self.cases.items():
+            far, _ = apart(off[rows] + own, self.tangent[rows])
+            cases[key] = _Difference(rows, far, own)
+        across, _ = apart(off, self.tangent)
+        return replace(self, off=off, across=across, cases=cases)
 
     def has(self, key: Key) -> Bools:
         """Return on which moves a hypothesis makes a difference, (m,)."""
@@ -255,8 +330,8 @@ class _PlannedMoves:
     def measure_steps(self) -> Floats:
         """Return how far each joint moves the TCP at the most, (m, 6) [m]."""
         out = np.zeros((len(self.begin) - 1, 6))
-        for (joint, _, _), (samples, _, moved) in self.cases.items():
-            np.maximum.at(out[:, joint - 1], self._moves_at(samples), moved)
+        for (joint, _, _), (samples, _, by) in self.cases.items():
+            np.maximum.at(out[:, joint - 1], self._moves_at(samples), lengths(by))
         return out
 
     def measure_off(self, key: Key | None, moves: Ints) -> Floats:

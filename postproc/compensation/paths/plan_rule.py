@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.model.flank_hypotheses import OPEN
 from postproc.robot.pose import MM
 
@@ -56,7 +56,25 @@ def tolerable_harm(tolerance: float) -> float:
 def choose_plan(
     plans: Sequence[PlanOutcome], weight: Floats, tolerance: float
 ) -> tuple[int, float]:
-    """Choose the plan of a move.
+    """Choose the plan of a move, see `choose_plans`.
+
+    Args:
+        plans: The first one is that without points.
+        weight: Of each hypothesis, (h,).
+        tolerance: Of paths [m].
+    """
+    off, worse = (
+        np.array([getattr(plan, name) for plan in plans])[:, None]
+        for name in ("off", "worse")
+    )
+    best, promise = choose_plans(off, worse, weight[None], tolerance)
+    return int(best[0]), float(promise[0])
+
+
+def choose_plans(
+    off: Floats, worse: Floats, weight: Floats, tolerance: float
+) -> tuple[Ints, Floats]:
+    """Choose the plans of m moves.
 
     Of the plans that no open hypothesis makes worse anywhere than without points by
     more than `tolerable_harm`, those with the least promise, and of these the one that
@@ -66,25 +84,25 @@ def choose_plan(
     it.
 
     Args:
-        plans: The first one is that without points.
-        weight: Of each hypothesis, (h,); those above `OPEN` are open.
+        off: As in `PlanOutcome`, (p, m, h) [m]; 0 where a hypothesis makes no
+            difference. The first plan is that without points.
+        worse: Likewise.
+        weight: Of each hypothesis, (m, h); those above `OPEN` are open.
         tolerance: Of paths [m].
 
     Returns:
-        Which plan, and its promise [m].
+        Which plan, (m,), and its promise, (m,) [m].
     """
     step, open_ = resolution(tolerance), weight > OPEN
-    promise = [_promise(plan, open_, step) for plan in plans]
-    expected = [float(plan.off @ weight) for plan in plans]
-    most = tolerable_harm(tolerance)
-    fit = [k for k, plan in enumerate(plans) if not (plan.worse[open_] > most).any()]
-    best = min(fit, key=lambda k: (promise[k], expected[k]))
-    return best, promise[best]
-
-
-def _promise(plan: PlanOutcome, open_: Bools, step: float) -> float:
-    worst = float(plan.off[open_].max(initial=0.0))
-    return float(np.ceil(np.round(worst / step, 6))) * step
+    most, harm = (
+        np.where(open_, of, 0.0).max(axis=2, initial=0.0) for of in (off, worse)
+    )
+    with np.errstate(invalid="ignore"):  # where nothing is asked for
+        promise = np.ceil(np.round(most / step, 6)) * step
+    harms = harm > tolerable_harm(tolerance)
+    expected = (off * weight).sum(axis=2)
+    best = np.lexsort((expected, promise, harms), axis=0)[0]
+    return best, np.take_along_axis(promise, best[None], axis=0)[0]
 
 
 def negligible(steps: Floats, tolerance: float) -> Bools:

@@ -8,18 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.compensation.paths.arcs import (
-    halves,
-    is_arc,
-    largest_zones,
-    measure_passing,
-    zone_sizes,
-)
-from postproc.compensation.paths.changed_windows import Part
+from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
-from postproc.compensation.paths.path_error import apart, sizes_of
+from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import (
     MoveOutcomes,
     Objection,
@@ -27,8 +19,8 @@ from postproc.compensation.paths.plan_outcomes import (
 )
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
+from postproc.compensation.paths.rounded_points import measure_rounded
 from postproc.language.visits import Visits
-from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
 NEAR = 4  # visits behind a move that may be worse for its points
@@ -105,7 +97,8 @@ def _try_plans(
 ) -> Iterator[tuple[Rows, MoveOutcomes, list[InsertionPlan]]]:
     """Yield every move with points, how it does without and by some plans, and these.
 
-    Half is looked at where nothing else keeps the finest promise.
+    Half is looked at where nothing else keeps the finest promise, and it is expected to
+    do better.
     """
     task, made = now.task, [now]
     if now.plan.stops:
@@ -113,8 +106,8 @@ def _try_plans(
     moves = task.compare(made, _moves_with_points(now))
     finest, halved = resolution(task.tolerance), dict[Rows, MoveOutcomes]()
     if any(flank.open_kinds for flank in task.flanks):
-        open_ = [rows for rows, own in moves.items() if own.choice[1] > finest]
-        plain = made[-1].plan
+        rough = {rows: own for rows, own in moves.items() if own.choice[1] > finest}
+        plain, open_ = made[-1].plan, task.expect_halves(made[-1], rough)
         own = plain.points.keys() & {v for rows in open_ for v in rows}
         made.append(task.predict(replace(plain, halved=frozenset(own))))
         halved = task.compare(made, open_)
@@ -164,7 +157,8 @@ def _bad(
     if not plan.points:
         return
     bent = {cut[0] for cut in now.flat if not now.may_be_chord(cut)}
-    judged = _Judged(now, without, _worst(now), _objections(now), bent)
+    worst = measure_rounded(now, sorted(_with_points(now) & now.sizes.keys()))
+    judged = _Judged(now, without, worst, _objections(now), bent)
     for v in sorted(_with_points(now)):
         if reason := judged.why_not(v):
             yield v, reason
@@ -244,110 +238,3 @@ def _of_moves(now: PathPrediction, far: dict[int, float]) -> dict[int, float]:
     """Say of both halves of an arc, which is one move, what the farther one is off."""
     visits = now.task.visits
     return {v: max(far.get(row, 0.0) for row in halves(visits, v)) for v in far}
-
-
-@dataclass(frozen=True)
-class _Corner:
-    """How a point on a way may be rounded.
-
-    Attributes:
-        half: Half of its largest zone [m].
-        moved: What that moves the path by at the point, (3,) [m].
-        done: How much of it the plan has.
-        beside: How far an arc is passed besides [m].
-    """
-
-    half: float
-    moved: Floats
-    done: float
-    beside: float
-
-    def farthest(self, aside: Floats, off: Floats, tangent: Floats) -> Floats:
-        """Say how far the path is off at the most, however the point is rounded, (s,).
-
-        Args:
-            aside: How far samples are from the point along the way, (s,) [m].
-            off: From the path to the TCP there, (s, 3) [m].
-            tangent: Directions of the path, (s, 3).
-        """
-        bend = 1 - (aside / max(self.half, 1e-12)) ** 2  # bounds chords and parabolas
-        by = bend[:, None] * self.moved
-        far = [apart(off + u * by, tangent)[0] for u in (-self.done, 1.0 - self.done)]
-        return np.where(bend >= 0, np.maximum(*far) + self.beside * bend, 0.0)
-
-
-def _worst(now: PathPrediction) -> dict[int, tuple[float, float]]:
-    """How far each move leaves its path, however its points are rounded.
-
-    Returns:
-        The distance [m], and where, as a share of the way.
-    """
-    rounded, found = _list_roundings(now), dict[int, tuple[float, float]]()
-    for v in _with_points(now) & now.sizes.keys():
-        paths, k = now.path_to(v)
-        samples = paths.samples(k)
-        way, off = paths.way[samples], paths.after.off[samples]
-        tangent = paths.tangent[samples]
-        worst = np.array(paths.after.across[samples])
-        points = zip(now.plan.points.get(v, ()), rounded.get(v, ()), strict=True)
-        for share, corner in points:
-            aside = np.abs(way - share * way[-1])
-            worst = np.maximum(worst, corner.farthest(aside, off, tangent))
-        found[v] = _largest_on(way, worst)
-    return found
-
-
-def _list_roundings(now: PathPrediction) -> dict[int, list[_Corner]]:
-    """Say how points on ways may be rounded, where they are no stops.
-
-    No corner is larger than half of a neighbouring piece; what cuts it off straight
-    passes the point farthest. On an arc it is no larger than zones are, by any law.
-    """
-    found: dict[int, list[_Corner]] = {}
-    for number, part in enumerate(now.parts):
-        moves = [v for v in now.plan.points if now.part[v] == number]
-        if moves:
-            found.update(_roundings_in(now, part, moves))
-    return found
-
-
-def _roundings_in(
-    now: PathPrediction, part: Part, moves: list[int]
-) -> Iterator[tuple[int, list[_Corner]]]:
-    """Yield the moves of a part, and how their points may be rounded."""
-    task, plan, in_time = now.task, now.plan, part.in_time
-    arm = task.setting.cell.arm
-    p, c = (
-        arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
-        for cycle in (in_time.after, in_time.before)
-    )
-    visits, arcs = task.visits, task.list_wanted_arcs(plan)
-    zone = largest_zones(arm, in_time.after) if len(arcs) else None
-    planned = zone_sizes(arm, in_time.after, in_time.after.targets)
-    for v in moves:
-        shares = plan.points[v]
-        rows = [int(part.own[visits.graph.before[v]]), *now.ends(v)]
-        if shares[-1] == 1.0:
-            rows.append(now.ends(v + 1)[0])
-        rows = rows[: len(shares) + 2]
-        size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
-        slope = np.diff(p[rows] - c[rows], axis=0) / size[:, None]
-        half = np.minimum(size[1:], size[:-1]) / 2
-        beside = np.zeros(len(half))
-        if zone is not None and is_arc(visits, v):
-            half = np.minimum(half, zone[rows[1:-1]])
-            beside = measure_passing(half, arcs.radius_of(v))
-        moved = np.diff(slope, axis=0) * half[:, None] / 2
-        done = np.minimum(planned[rows[1:-1]] / np.maximum(half, 1e-12), 1.0)
-        stop = int(v in plan.stops)
-        moved[:stop] = beside[:stop] = 0.0
-        yield v, [*map(_Corner, half, moved, done, beside)]
-
-
-# How far moves are from their paths, by the visit at their end.
-
-
-def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:
-    """Return the largest distance on a way, and where, as a share of it."""
-    top = int(far.argmax())
-    return float(far[top]), float(way[top] / max(way[-1], 1e-12))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
@@ -52,6 +54,14 @@ class Backlash(JointEffect):
         """Turn every joint in proportion to its direction."""
         pairs = zip(self.joints, p, strict=True)
         return [Term(turn_joint(j), linear(b), (side(j),)) for j, b in pairs]
+
+    def angles(self, batch: ArmStates, p: Floats) -> Floats:
+        """Return the joint errors (n, 6) [rad], those of all joints in one go."""
+        if len(self.joints) < len(JOINTS):
+            return super().angles(batch, p)
+        own = np.empty(len(JOINTS))
+        own[self.acts_on()] = p
+        return np.asarray(batch.states.direction * own)
 
     def basis(self, batch: ArmStates) -> Floats:
         """Evaluate lambda, (n, p)."""

@@ -20,6 +20,7 @@ from postproc.compensation.paths.insertion_loop import TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
 from postproc.compensation.paths.plan_outcomes import BEGINS
+from postproc.compensation.paths.rounded_points import RoundedPoints
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
 from postproc.report.simulation import _read, setup_of, simulate_file
@@ -760,7 +761,8 @@ def test_a_rounded_point_is_judged_by_the_worst_of_all_its_zones() -> None:
     aside, half, done = np.linspace(0.0, 0.015, 7), 0.01, 0.25
     moved, tangent = 1e-4 * rng.normal(size=3), np.tile((1.0, 0.0, 0.0), (7, 1))
     off = 1e-4 * rng.normal(size=(7, 3))
-    found = prune._Corner(half, moved, done, 0.0).farthest(aside, off, tangent)
+    points = RoundedPoints(np.array([half]), moved[None], np.array([done]), np.zeros(1))
+    found = points.farthest(np.zeros(7, dtype=int), aside, off, tangent)
     bend = np.maximum(1.0 - (aside / half) ** 2, 0.0)[:, None]
     tried = [off + u * bend * moved for u in np.linspace(-done, 1.0 - done, 21)]
     worst = np.max([np.hypot(one[:, 1], one[:, 2]) for one in tried], axis=0)

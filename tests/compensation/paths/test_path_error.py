@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -259,6 +260,26 @@ def test_sides_that_nobody_knows_widen_it(shop: Path, ran) -> None:
     assert paths.before.unsure[first].max() > 1e-5
     assert paths.before.unsure[paths.samples(len(paths) - 1)].max() < 1e-9
     np.testing.assert_allclose(paths.after.across, paths.before.across, atol=1e-12)
+
+
+def test_the_program_as_written_is_told_at_other_samples(ran) -> None:
+    paths = ran[0].paths
+    same = paths.as_written(paths).before
+    for name, column in vars(paths.before).items():
+        np.testing.assert_array_equal(getattr(same, name), column)
+    some = np.arange(len(paths) - 2, len(paths))
+    every = np.concatenate([np.arange(len(paths.way))[paths.samples(k)][::-3][::-1]
+                            for k in some])  # fmt: skip
+    count = [-(-np.diff(paths.first)[k] // 3) for k in some]
+    fewer = replace(
+        paths, visit=paths.visit[some], first=np.cumsum([0, *count]),
+        way=paths.way[every],
+    )  # fmt: skip
+    told = paths.as_written(fewer).before
+    np.testing.assert_array_equal(told.sizes, paths.before.sizes[some])
+    np.testing.assert_array_equal(told.shares, paths.before.shares[some])
+    others = np.setdiff1d(np.arange(len(every)), told.largest)
+    np.testing.assert_array_equal(told.off[others], paths.before.off[every][others])
 
 
 @pytest.mark.parametrize("kind", [FlankKind.ELASTIC, FlankKind.START])

@@ -10,7 +10,12 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
-from postproc.compensation.paths.plan_outcomes import BEGINS, MoveOutcomes, Predicted
+from postproc.compensation.paths.plan_outcomes import (
+    BEGINS,
+    MoveOutcomes,
+    Predicted,
+    expect_better,
+)
 from postproc.compensation.paths.plan_outcomes import compare as compare_moves
 from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint
 from postproc.robot.pose import MM
@@ -32,10 +37,11 @@ class _Known(FlankCases):
 
 def program(off: float, *cases: FlankCase) -> Any:
     """A program of one move, as far off everywhere."""
+    far = np.full(len(WAY), off * MM)
     return SimpleNamespace(
-        way=WAY, cases=_Known(cases),
+        way=WAY, cases=_Known(cases), tangent=np.tile((1.0, 0.0, 0.0), (len(WAY), 1)),
         spans_to=lambda v: (np.zeros(len(v), int), np.full(len(v), len(WAY))),
-        after=SimpleNamespace(across=np.full(len(WAY), off * MM)),
+        after=SimpleNamespace(across=far, off=np.outer(far, (0.0, 1.0, 0.0))),
     )  # fmt: skip
 
 
@@ -48,8 +54,8 @@ def compare(plans: tuple[Any, ...], rows: tuple[int], most: float) -> MoveOutcom
 def case(joint: int, first: int, last: int, off: float, moved: float) -> FlankCase:
     rows = np.arange(first, last)
     far = np.full(len(rows), off * MM)
-    return FlankCase(joint, FlankKind.ELASTIC, 0.25, rows, far,
-                     np.full(len(rows), moved * MM))  # fmt: skip
+    by = np.tile((0.0, moved * MM, 0.0), (len(rows), 1))
+    return FlankCase(joint, FlankKind.ELASTIC, 0.25, rows, far, by)
 
 
 def test_harm_is_counted_place_by_place_and_named() -> None:
@@ -89,6 +95,18 @@ def test_joints_with_small_steps_never_speak_against_a_plan() -> None:
         points = program(0.02, case(5, 60, 63, 0.2, moved))
         found = compare((program(0.1), points), (7,), TOLERANCE)
         assert bool(found.keys) == counts
+
+
+def test_points_elsewhere_are_expected_to_move_the_path_evenly() -> None:
+    plans = program(0.16), program(0.12)
+    told = Predicted([plans[1]], np.zeros(8, dtype=np.int64))
+    known = {(7,): compare(plans, (7,), TOLERANCE)}
+    for moved, better in ((-0.1, [(7,)]), (-0.01, [(7,)]), (0.1, [])):
+        by = np.outer((moved, moved, moved), (0.0, 1.0, 0.0)) * MM
+        found = expect_better(told, [(np.array([0.0, 0.4, 1.0]), by)], known)
+        assert found == better
+    by[1] *= 3.0  # at one point only: 95 % of the way are off as before
+    assert not expect_better(told, [(np.array([0.0, 0.4, 1.0]), by)], known)
 
 
 def test_links_that_run_on_at_stops_are_pushed_together_on_the_way() -> None:
