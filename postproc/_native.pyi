@@ -173,7 +173,9 @@ def next_aims(
     off: Bools,
     passes: Bools,
     missed: Floats,
-) -> tuple[Floats, Floats, Floats]: ...
+    lead: Floats,
+    watched: tuple[int, int],
+) -> tuple[Floats, Floats, Floats, Floats]: ...
 
 # commands.rs: what to command (`postproc.compensation.inverse_model`)
 def commands(

@@ -101,6 +101,11 @@ struct Settling<'a> {
 /// How the place of a command answers the sides that it is made for, a row for each side.
 type Gain = [Three; 6];
 
+/// What has become of a visit in a sweep: aim, reached, play, by what the path is passed
+/// elsewhere there, by what its target and the one before move, and the last sweep that has
+/// changed something.
+pub const SETTLED_AS: usize = 34;
+
 /// What the arrival at a visit depends on, but for where it is passed.
 struct Look {
     visit: usize,
@@ -171,6 +176,28 @@ impl Settling<'_> {
         } else {
             None
         }
+    }
+
+    /// Tell what has become of a visit.
+    fn settled(&self, i: usize) -> [f64; SETTLED_AS] {
+        let (bends, play) = (&self.bends, &self.play[i]);
+        let before = bends.before[i].map_or(STAYS, |k| bends.moved[k]);
+        let changed = [f64::from(self.changed[i])];
+        let places = [&bends.shift[i], &bends.moved[i], &before];
+        let sides = [&self.aims[i], &self.reached[i], &play.lo, &play.hi];
+        let all = sides.iter().flat_map(|six| six.iter());
+        let mut all = all.chain(places.iter().flat_map(|place| place.iter())).chain(&changed);
+        std::array::from_fn(|_| *all.next().unwrap_or(&f64::NAN))
+    }
+
+    /// Let a visit become what it has become elsewhere in the same sweep.
+    fn follow(&mut self, i: usize, settled: &[f64; SETTLED_AS]) {
+        let six = |k: usize| std::array::from_fn(|j| settled[6 * k + j]);
+        let place = |k: usize| std::array::from_fn(|j| settled[24 + 3 * k + j]);
+        (self.aims[i], self.reached[i]) = (six(0), six(1));
+        self.play[i] = Clamp { lo: six(2), hi: six(3) };
+        self.bends.follow(i, place(0), place(1), place(2));
+        self.changed[i] = settled[33] as i32;
     }
 
     /// Settle a visit anew, if what it depends on has changed since that was done.
@@ -465,8 +492,10 @@ fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
 /// Args: the model and the inverse kinematics; commands (n, 4, 4) [m] and tools, likewise
 /// or (1, 4, 4); their states: joint angles of the commands, and the sides that they were
 /// made for; the ways that led to the visits; (6, 6), from joints to drives; which may be
-/// corrected for other sides, which are reached from others, and which the arm passes, (n,); by what the path misses
-/// places and is to be bent, (n, 3) [m].
+/// corrected for other sides, which are reached from others, and which the arm passes, (n,);
+/// by what the path misses places and is to be bent, (n, 3) [m]; what became of the first k
+/// in every sweep (s k, 34), where they were settled among others; and of which visits that
+/// is returned.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what a look has found
 pub fn next_aims<'py>(
@@ -482,7 +511,9 @@ pub fn next_aims<'py>(
     off: PyReadonlyArray1<'py, bool>,
     passes: PyReadonlyArray1<'py, bool>,
     missed: PyReadonlyArray2<'py, f64>,
-) -> PyResult<(Block<'py>, Block<'py>, Block<'py>)> {
+    lead: PyReadonlyArray2<'py, f64>,
+    watched: (usize, usize),
+) -> PyResult<(Block<'py>, Block<'py>, Block<'py>, Block<'py>)> {
     let odd = |_| PyIndexError::new_err("six rows of six");
     let (states, known) = (states.rows(core)?, ways.play.list()?);
     let (n, half, angles) = (states.len(), row(&ways.half)?, rows::<6>(&ways.angles)?);
@@ -529,13 +560,25 @@ pub fn next_aims<'py>(
     if !settling.is_sound() {
         return Err(PyIndexError::new_err("visits or edges that are not there"));
     }
+    let (lead, watched) = (rows::<SETTLED_AS>(&lead)?, watched.0..watched.1);
+    let mut seen = Vec::with_capacity(SWEEPS as usize * watched.len());
+    let led = n.min(lead.len() / (SWEEPS + LAST) as usize);
     settling.prepare();
     for round in 0..SWEEPS + LAST {
         settling.holds = round >= SWEEPS;
-        each(py, n, |i| settling.sweep(i, round))?;
+        each(py, n, |i| {
+            match lead.get(round as usize * led + i).filter(|_| i < led) {
+                Some(settled) => settling.follow(i, settled),
+                None => settling.sweep(i, round),
+            }
+            if watched.contains(&i) {
+                seen.push(settling.settled(i));
+            }
+        })?;
     }
     let bends = &settling.bends;
     let farther = (0..n).map(|i| std::array::from_fn(|k| bends.shift[i][k] - bends.moved[i][k]));
     let farther: Vec<Three> = farther.collect();
-    Ok((array(py, settling.aims), array(py, settling.reached), array(py, farther)))
+    let aims = array(py, settling.aims);
+    Ok((aims, array(py, settling.reached), array(py, farther), array(py, seen)))
 }

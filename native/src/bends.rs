@@ -200,6 +200,16 @@ impl Bends<'_> {
         self.round(i);
     }
 
+    /// Let a target, and the one before it, move as they did elsewhere.
+    pub fn follow(&mut self, i: usize, by: Three, moved: Three, before: Three) {
+        (self.shift[i], self.moved[i]) = (by, moved);
+        if let Some(k) = self.before[i] {
+            self.moved[k] = before;
+            self.round(k);
+        }
+        self.round(i);
+    }
+
     /// Round a corner anew, as its targets lie now.
     fn round(&mut self, i: usize) {
         if let Some(mut own) = self.corners[i] {

@@ -66,11 +66,16 @@ class NextAims:
         reached: Those that they are reached from then, (n, 6): the same, but where none
             agree.
         farther: By what the path then passes them farther than they move, (n, 3) [m].
+        seen: What became of those that are watched, sweep by sweep, (s w, 34).
     """
 
     sides: Floats
     reached: Floats
     farther: Floats
+    seen: Floats
+
+
+UNLED_AIMS = np.zeros((0, 34))
 
 
 def next_aims(
@@ -82,6 +87,8 @@ def next_aims(
     free: Bools,
     off: Bools,
     missed: Floats,
+    lead: Floats = UNLED_AIMS,
+    watched: slice = slice(0, 0),
 ) -> NextAims:
     """Find the sides at which aim and arrival agree, target after target.
 
@@ -106,6 +113,8 @@ def next_aims(
         free: Which may be corrected for other sides, (n,).
         off: .. and which are reached from others, (n,).
         missed: By what the path misses places, and is to be bent, (n, 3) [m].
+        lead: What was `seen` of the first k of them, where they were settled before.
+        watched: Those of which that is to be seen.
     """
     arm, evaluator = looked.arm, model.evaluator(looked.arm)
     ways = Ways.of(looked, corrected)
@@ -114,6 +123,7 @@ def next_aims(
     poses = floats(solved.command), floats(few_rows(looked.targets.tool))
     found = _native.next_aims(
         evaluator.core, arm.solver, *poses, evaluator.states(here), ways,
-        floats(arm.coupling), free, off, fly, floats(missed),
+        floats(arm.coupling), free, off, fly, floats(missed), lead,
+        (watched.start, watched.stop),
     )  # fmt: skip
     return NextAims(*found)

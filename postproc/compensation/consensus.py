@@ -120,12 +120,16 @@ class RoundLog:
     Attributes:
         left, right: Visits that are watched.
         begin, end: What was looked at there.
+        seam: The first visits of the window behind.
+        settled: What has become of these when sides were settled, by rounds.
     """
 
     left: slice = field(default_factory=lambda: slice(0, 0))
     right: slice = field(default_factory=lambda: slice(0, 0))
     begin: Glimpses = NOT_SEEN
     end: Glimpses = NOT_SEEN
+    seam: slice = field(default_factory=lambda: slice(0, 0))
+    settled: dict[int, Floats] = field(default_factory=dict)
 
     def see(self, turn: int | None, seen: Snapshot) -> None:
         """Keep what is watched of a look at all visits."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from postproc.arrays import (
     spans,
     take_rows,
 )
-from postproc.compensation.aims import NextAims, next_aims
+from postproc.compensation.aims import UNLED_AIMS, NextAims, next_aims
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.arc_turns import ArcTurns
 from postproc.compensation.consensus import (
@@ -177,6 +179,8 @@ class Iteration:
         off: Bools,
         missed: Floats,
         late: bool,
+        lead: Floats,
+        watched: slice,
     ) -> NextAims:
         """Give the sides to correct targets for next, see `next_aims`.
 
@@ -186,7 +190,7 @@ class Iteration:
         free = corrected & (off | ~current.settled)
         with self.setting.clock("solve"):
             given = self.setting.model, solved, self.states.with_(tool=tool), looked
-            found = next_aims(*given, corrected, free, off, missed)
+            found = next_aims(*given, corrected, free, off, missed, lead, watched)
         if not late:
             return found
         middle = (solved.direction + looked.side) / 2
@@ -350,10 +354,12 @@ class Boundary:
     Attributes:
         begin: Where the arm stands at the first visit.
         looks: What the window before looked at, at the first k visits.
+        settled: What it has settled of the first ones, by rounds, see `NextAims.seen`.
     """
 
     begin: StartState = NOWHERE
     looks: Glimpses = NOT_SEEN
+    settled: Mapping[int, Floats] = field(default_factory=dict)
 
 
 FROM_START = Boundary()
@@ -438,7 +444,7 @@ def iterate(
         if late:
             current = replace(current, settled=current.settled | off)
         given = current, looked, proposal.corrected, off, missed
-        found = iteration.find_aims(*given, late)
+        found = course.settle(turn, *given, late)
         current, number = iteration.next_aim(current, found, missed), number + 1
     raise AssertionError("unreachable")
 
@@ -471,6 +477,13 @@ class _Course:
             found = self.replanner.after(values, lead, near)
         if self.iteration.part:
             self.trail.see(turn, _glimpse(current, proposal, found))
+        return found
+
+    def settle(self, turn: int, *given: Any) -> NextAims:
+        """Find what to correct targets for next, see `Iteration.find_aims`."""
+        lead = self.lead.settled.get(turn, UNLED_AIMS)
+        found = self.iteration.find_aims(*given, lead, self.trail.seam)
+        self.trail.settled[turn] = found.seen
         return found
 
 

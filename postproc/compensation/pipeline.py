@@ -427,7 +427,8 @@ class _WindowWork:
         if own.first == 0:
             left = slice(0, 0)
         right = own.rows(self._after(own), min(own.end + cuts.BAND, own.stop))
-        return RoundLog(left, right)
+        seam = slice(right.start, min(right.start + cuts.SEAM, right.stop))
+        return RoundLog(left, right, seam=seam)
 
     def whole(self) -> list[Window]:
         """Return the program as one window."""
@@ -462,5 +463,5 @@ def _lead(window: Window, before: Corrected | None) -> tuple[Boundary, Arrivals,
     if before is None or window.begin == 0:
         return FROM_START, UNLED, 0
     rows = slice(0, window.first - window.begin)
-    lead = Boundary(before.exit, before.trail.end[rows])
+    lead = Boundary(before.exit, before.trail.end[rows], before.trail.settled)
     return lead, before.arrivals, before.doubtful

@@ -254,3 +254,13 @@ def test_where_a_window_begins_is_foretold_though_lines_tell_no_branch(
         assert found.slot == whole.slot[visit] >= 0
         np.testing.assert_allclose(found.q[0], whole.q[visit], rtol=0, atol=1e-9)
     assert len(reading.visits) > 250
+
+
+def test_joints_that_rest_for_longer_than_a_halo_agree(
+    job, monkeypatch, joined, bench_cell, bench_model
+) -> None:
+    """Along a row, some joints remember where they lie in their play all the way."""
+    texts = written(milled(bench_cell, 2500))["job.pdl"]
+    program = made.Made("job.pdl", texts["job.pdl"])
+    wanted = told(job(program, 10_000))
+    assert told(job(program, 600)) == wanted and joined == [4]
