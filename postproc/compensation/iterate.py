@@ -173,14 +173,14 @@ class Iteration:
 
     def find_aims(
         self,
+        lead: Floats,
+        watched: slice,
         current: SolverState,
         looked: Replanned,
         corrected: Bools,
         off: Bools,
         missed: Floats,
         late: bool,
-        lead: Floats,
-        watched: slice,
     ) -> NextAims:
         """Give the sides to correct targets for next, see `next_aims`.
 
@@ -482,7 +482,7 @@ class _Course:
     def settle(self, turn: int, *given: Any) -> NextAims:
         """Find what to correct targets for next, see `Iteration.find_aims`."""
         lead = self.lead.settled.get(turn, UNLED_AIMS)
-        found = self.iteration.find_aims(*given, lead, self.trail.seam)
+        found = self.iteration.find_aims(lead, self.trail.seam, *given)
         self.trail.settled[turn] = found.seen
         return found
 
