@@ -1,7 +1,7 @@
 """A program that is corrected window by window comes out as if it were corrected whole.
 
 To the byte: output, report and record. Whether cuts lie inside fly runs or at stops,
-what is next to them, and how many processes work on it, makes no difference.
+what is next to them, and how many threads work on it, makes no difference.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FAR = "9000.0000, 0.0000, 0.0000, 0.0000, 180.0000, 0.0000"
 
 @pytest.fixture
 def job(bench_cell, bench_model, monkeypatch):
-    def run(program: made.Made, least: int = LEAST, processes: int = 1) -> Outcome:
+    def run(program: made.Made, least: int = LEAST, threads: int = 1) -> Outcome:
         monkeypatch.setattr(cuts, "LEAST", least)
         return compensate(
             program.source,
@@ -39,7 +39,7 @@ def job(bench_cell, bench_model, monkeypatch):
             bench_model,
             name=program.name,
             variables=program.variables,
-            processes=processes,
+            threads=threads,
         )
 
     for name, value in (("HALO", HALO), ("BAND", BAND), ("RUN_UP", RUN_UP)):
@@ -159,7 +159,7 @@ def test_inside_runs_windows_change_no_byte(job, joined, change) -> None:
     wanted = told(whole)
     for least in (90, 230):
         assert told(job(program, least)) == wanted
-    assert told(job(program, 131, processes=2)) == wanted
+    assert told(job(program, 131, threads=2)) == wanted
     if change not in (leaving, shared):  # one window where things reach so far
         assert min(joined) > 2
 
@@ -171,7 +171,7 @@ def test_between_stops_windows_change_no_byte(job, joined, monkeypatch, kind) ->
     wanted = told(job(program, 10_000))
     for least in (90, 170):
         assert told(job(program, least)) == wanted
-    assert told(job(program, 90, processes=2)) == wanted
+    assert told(job(program, 90, threads=2)) == wanted
     assert min(joined) > 2
 
 
