@@ -31,6 +31,7 @@ from postproc.model.model import Model
 from postproc.motion.joint_path import NOWHERE, StartState
 from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
+from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.pose import MM
@@ -154,8 +155,11 @@ def start_of(cell: Cell) -> Start:
 
 def with_measured_play(cell: Cell, model: Model) -> Cell:
     """Let directions be told by the gaps that the model found, not by a guess."""
-    arm = replace(cell.arm, play=play_of_model(model, cell.arm))
-    return replace(cell, arm=arm)
+
+    def with_play(arm: Arm) -> Arm:
+        return replace(arm, play=play_of_model(model, arm))
+
+    return replace(cell, arm=model.arms.of(cell.arm, with_play))
 
 
 def prepare_cell(cell: Cell, model: Model, options: Options) -> Cell:

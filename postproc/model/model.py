@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, map_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
+from postproc.model.cache import ArmCache
 from postproc.model.doubt import Doubt
 from postproc.model.effect_sum import Combination
 from postproc.model.effects import restore
@@ -258,14 +259,17 @@ class Model:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @cached_property
-    def _evaluators(self) -> dict[int, tuple[Arm, Evaluator]]:
-        return {}
+    def _evaluators(self) -> ArmCache[Evaluator]:
+        return ArmCache()
 
     def evaluator(self, arm: Arm) -> Evaluator:
         """Return the effects that may be compensated in the core's terms."""
-        if id(arm) not in self._evaluators:
-            self._evaluators[id(arm)] = arm, self._make_evaluator(arm)
-        return self._evaluators[id(arm)][1]
+        return self._evaluators.of(arm, self._make_evaluator)
+
+    @cached_property
+    def arms(self) -> ArmCache[Arm]:
+        """Arms with the play that this model has found."""
+        return ArmCache()
 
     def _make_evaluator(self, arm: Arm) -> Evaluator:
         effects, values, covariance = self.compensable()
