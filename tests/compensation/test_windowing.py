@@ -181,6 +181,7 @@ def test_time_laws_are_found_for_whole_runs(job, monkeypatch, joined) -> None:
     program = made.milling(900)
     wanted = told(job(program, 10_000))
     assert told(job(program, 150)) == wanted and min(joined) > 2
+    assert told(job(program, 150, threads=2)) == wanted
 
 
 def test_a_halo_that_is_too_small_is_found_out(job, monkeypatch, joined) -> None:
