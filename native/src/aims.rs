@@ -1,9 +1,10 @@
 //! The sides that targets are corrected for next: `postproc.compensation.aims`.
 //!
-//! A correction moves its target, and with it the place of every joint in its play there
-//! and behind. So sides are settled in the order of the program: at each target from what
-//! the ones before have become, to where aim and arrival are the same. A rounded corner
-//! moves with the target behind it as well, so that this is done a few times.
+//! A correction moves its target, and with it the position of every joint in its play at
+//! this target and at later ones. So the core solves for the sides in the order of the
+//! program: at each target, with the corrections of the targets before, aim and arrival
+//! must be the same. A blend depends on the target behind it as well, so the core sweeps
+//! over the program several times.
 
 use std::cell::OnceCell;
 
@@ -22,21 +23,21 @@ use crate::rows::{array, each, flat, row, rows, Six, Three};
 use crate::solver::Solver;
 use crate::terms::State;
 
-const STEP: f64 = 0.5; // of a side, by which the answer of a command is found
+const STEP: f64 = 0.5; // of a side: step of the derivatives of a command
 const SETTLED: f64 = 1e-6; // sides that differ by less are the same
 const AGREES: f64 = 1e-3; // .. and need no other correction
-const GOES_ON: usize = 4; // looks along the answers, and as many from flanks
-const NEWTON: usize = 6; // looks along their derivatives
-const SWEEPS: i32 = 5; // the later ones know what becomes of the target behind
-const LAST: i32 = 4; // sweeps that follow what has been settled
-const FAR: usize = 6; // visits from what is reached from other sides, or bent by much
-const LARGE: f64 = 5e-6; // [m] .. which is by more than this
-const NEAR: f64 = 4.0; // halves of a play's width: a joint that moves farther may well leap
+const GOES_ON: usize = 4; // fixed-point iterations, and as many from flanks
+const NEWTON: usize = 6; // iterations of Newton's method
+const SWEEPS: i32 = 5; // the later ones know the target behind
+const LAST: i32 = 4; // sweeps with constant aims
+const FAR: usize = 6; // visits from one with another arrival, or a large miss
+const LARGE: f64 = 5e-6; // [m] a large miss
+const NEAR: f64 = 4.0; // halves of a play's width: a joint that moves farther may change its side
 const LEAP: f64 = 0.5; // of a side, from visit to visit
-const LEAPT: f64 = 0.1; // what a leap counts against what is off, both of a side
+const LEAPT: f64 = 0.1; // weight of a leap against a disagreement, both of a side
 const TINY: f64 = 1e-7; // of a side, for derivatives
-const SMALL: f64 = 1e-8; // [rad] and [m] that are not worth another look
-const LITTLE: f64 = 1e-4; // [m] by which the answer of angles is found
+const SMALL: f64 = 1e-8; // [rad] and [m] that need no further sweep
+const LITTLE: f64 = 1e-4; // [m] step of the derivatives of angles
 const STAYS: Three = [0.0; 3];
 
 type Block<'py> = Bound<'py, PyArray2<f64>>;
@@ -57,7 +58,7 @@ pub struct Ways<'py> {
     corrected: PyReadonlyArray1<'py, bool>,
 }
 
-/// What it takes to settle sides, and what has become of the visits so far.
+/// The inputs of the sides, and the state of the visits after the last sweep.
 struct Settling<'a> {
     core: &'a Core,
     solver: &'a Solver,
@@ -76,49 +77,48 @@ struct Settling<'a> {
     free: Vec<bool>,
     off: &'a [bool],
     passes: &'a [bool],
-    /// By what the path misses places, and is to be bent.
+    /// Distance by which the path misses places, which the targets must make up for.
     missed: &'a [Three],
-    /// How angles answer where places move, and of which joints targets and corners tell the
-    /// ways to visits, of visits that were asked for.
+    /// Derivatives of the angles by places, and the joints whose paths to the visit follow
+    /// from targets and blends alone. Only of visits that were needed.
     answers: Vec<OnceCell<Answer>>,
-    told: Vec<OnceCell<[bool; 6]>>,
-    /// What is known of the play at visits, as it was found and as it becomes.
+    blended: Vec<OnceCell<[bool; 6]>>,
+    /// State of the play operator at visits, as it was found and as it will be.
     known: Vec<Clamp>,
     play: Vec<Clamp>,
-    /// What the path moves by at the visits, and what their targets move by for that.
+    /// Displacements of the path at the visits, and of their targets.
     bends: Bends<'a>,
-    /// How commands answer, of visits that may be corrected for other sides [m].
+    /// Derivatives of commands by sides, of visits that may get other sides [m].
     gains: Vec<Option<Gain>>,
-    /// What they are corrected for next, and from where they are reached then.
+    /// The sides that visits are corrected for next, and those of their arrivals then.
     aims: Vec<Six>,
     reached: Vec<Six>,
-    /// The sweep that has changed something of them last.
+    /// The last sweep that changed something of them.
     changed: Vec<i32>,
-    /// What they are corrected for stays now.
+    /// The aims are constant from now on.
     holds: bool,
 }
 
-/// How the place of a command answers the sides that it is made for, a row for each side.
+/// Derivatives of the place of a command by the sides of its aim, a row for each side.
 type Gain = [Three; 6];
 
-/// What has become of a visit in a sweep: aim, reached, play, by what the path is passed
-/// elsewhere there, by what its target and the one before move, and the last sweep that has
-/// changed something.
-pub const SETTLED_AS: usize = 34;
+/// Length of the state of a visit after a sweep: aim, arrival, play, displacements of the
+/// path there, of its target and of the target before, and the last sweep with a change.
+pub const STATE: usize = 34;
 
-/// What the arrival at a visit depends on, but for where it is passed.
+/// The inputs of the arrival at a visit, except for where the path passes it.
 struct Look {
     visit: usize,
-    /// The way there, None where nothing of it has moved, or several lead there.
+    /// The path to the visit; None if nothing of it has moved, or if there are several.
     way: Option<Way>,
-    /// Of which joints the way tells, and of which the plays told the sides.
-    told: [bool; 6],
+    /// The joints whose path `way` describes, and those whose side follows from the play.
+    blended: [bool; 6],
     known: [bool; 6],
     moved: Three,
 }
 
 impl Settling<'_> {
-    /// Tell whether all that is referred to is there.
+    /// Return True if all columns have their length, and all references exist.
     fn is_sound(&self) -> bool {
         let (n, e) = (self.aims.len(), self.clamps.len());
         let columns = [self.commands.len(), self.angles.len(), self.found.len()];
@@ -141,7 +141,7 @@ impl Settling<'_> {
             && self.source.iter().all(|visit| *visit < n as i64)
     }
 
-    /// Begin with bent corners; only what is near something that is off by much is free.
+    /// Make up for misses of the path; only visits near another arrival or a miss are free.
     fn prepare(&mut self) {
         let n = self.aims.len();
         self.bends.before = (0..n).map(|i| self.before(i)).collect();
@@ -157,17 +157,17 @@ impl Settling<'_> {
         }
     }
 
-    /// Tell whether the path is to be bent at a visit, by more than something.
+    /// Return True if the path misses a visit by more than a distance.
     fn is_bent(&self, i: usize, most: f64) -> bool {
         self.missed[i].iter().any(|by| by.abs() > most)
     }
 
-    /// By what the path is to move for what it misses a visit by.
+    /// Return the displacement of the path that makes up for its miss of a visit.
     fn bent(&self, i: usize) -> Three {
         self.missed[i].map(|part| -part)
     }
 
-    /// The visit before one, where it alone leads there.
+    /// Return the visit before one, if the path comes from there alone.
     fn before(&self, i: usize) -> Option<usize> {
         let edge = self.first[i] as usize;
         let alone = self.first[i + 1] as usize == edge + 1 && self.source[edge] + 1 == i as i64;
@@ -178,8 +178,8 @@ impl Settling<'_> {
         }
     }
 
-    /// Tell what has become of a visit.
-    fn settled(&self, i: usize) -> [f64; SETTLED_AS] {
+    /// Return the state of a visit.
+    fn state(&self, i: usize) -> [f64; STATE] {
         let (bends, play) = (&self.bends, &self.play[i]);
         let before = bends.before[i].map_or(STAYS, |k| bends.moved[k]);
         let changed = [f64::from(self.changed[i])];
@@ -190,17 +190,17 @@ impl Settling<'_> {
         std::array::from_fn(|_| *all.next().unwrap_or(&f64::NAN))
     }
 
-    /// Let a visit become what it has become elsewhere in the same sweep.
-    fn follow(&mut self, i: usize, settled: &[f64; SETTLED_AS]) {
-        let six = |k: usize| std::array::from_fn(|j| settled[6 * k + j]);
-        let place = |k: usize| std::array::from_fn(|j| settled[24 + 3 * k + j]);
+    /// Take the state of a visit from the same sweep over the window before.
+    fn follow(&mut self, i: usize, state: &[f64; STATE]) {
+        let six = |k: usize| std::array::from_fn(|j| state[6 * k + j]);
+        let place = |k: usize| std::array::from_fn(|j| state[24 + 3 * k + j]);
         (self.aims[i], self.reached[i]) = (six(0), six(1));
         self.play[i] = Clamp { lo: six(2), hi: six(3) };
         self.bends.follow(i, place(0), place(1), place(2));
-        self.changed[i] = settled[33] as i32;
+        self.changed[i] = state[33] as i32;
     }
 
-    /// Settle a visit anew, if what it depends on has changed since that was done.
+    /// Solve for the sides of a visit again, if its inputs have changed since.
     fn sweep(&mut self, i: usize, round: i32) {
         let near = i.saturating_sub(2)..(i + 3).min(self.changed.len());
         if self.changed[near].iter().all(|at| *at < round - 1) {
@@ -213,11 +213,11 @@ impl Settling<'_> {
         }
     }
 
-    /// Settle a visit; return the sides to correct it for.
+    /// Solve for the sides of a visit; return those to correct it for.
     ///
-    /// Looked for is what agrees next to its sides; of joints that hardly move on a way
-    /// without a stop, next to those of the visit before: there may be several that agree,
-    /// and a path should not leap to and fro.
+    /// Several sides may agree with their arrivals. The solution is the one next to the
+    /// sides of the visit. For a joint that hardly moves on a path without a stop, it is the
+    /// one next to the sides of the visit before, so that the path does not leap to and fro.
     fn settle(&mut self, i: usize) -> Six {
         let (aim, last) = (self.states.side[i], self.aims[i]);
         let differs = |a: &Six, b: &Six| (0..6).any(|j| (a[j] - b[j]).abs() > AGREES);
@@ -240,37 +240,38 @@ impl Settling<'_> {
         self.pass(i, by, self.arrived(&look, &by), next)
     }
 
-    /// Pass a visit elsewhere by something; return the sides that it is corrected for.
+    /// Displace the path at a visit; return the sides that the visit is corrected for.
     fn pass(&mut self, i: usize, by: Three, arrived: (Six, Clamp), aim: Six) -> Six {
         (self.reached[i], self.play[i]) = arrived;
         self.bends.pass(i, by);
         aim
     }
 
-    /// By what the path is to pass a visit elsewhere, corrected for some sides.
+    /// Return the displacement of the path at a visit that is corrected for some sides.
     fn shift(&self, i: usize, aim: &Six) -> Three {
         let bent = self.bent(i);
         let by = self.gains[i].map(|gain| moved(&gain, aim, &self.states.side[i]));
         by.map_or(bent, |by| sum(&bent, &by))
     }
 
-    /// Gather what the arrival at a visit depends on; `stays`: and nothing of it has moved.
+    /// Gather the inputs of the arrival at a visit; `stays`: nothing of them has moved.
     fn look(&self, i: usize, stays: bool) -> Look {
         let answer = |k: usize| once(&self.answers, k, || self.answer(k));
         let way = if stays { None } else { Way::to(i, &self.bends, &answer, false) };
-        let told = || {
+        let blended = || {
             let (source, rest) = (self.bends.before[i]?, Way::to(i, &self.bends, &answer, true)?);
-            Some(rest.tells(&self.angles[source], &self.clamps[self.first[i] as usize]))
+            Some(rest.describes(&self.angles[source], &self.clamps[self.first[i] as usize]))
         };
         let none = [false; 6];
-        let told = way.as_ref().map_or(none, |_| once(&self.told, i, || told().unwrap_or(none)));
+        let found = || once(&self.blended, i, || blended().unwrap_or(none));
+        let blended = way.as_ref().map_or(none, |_| found());
         let (known, at, half) = (&self.known[i], &self.angles[i], &self.half);
         let side = |j: usize| place_in_play(at[j], known.lo[j], known.hi[j], half[j]);
         let known = std::array::from_fn(|j| (side(j) - self.found[i][j]).abs() <= SETTLED);
-        Look { visit: i, way, told, known, moved: self.bends.moved[i] }
+        Look { visit: i, way, blended, known, moved: self.bends.moved[i] }
     }
 
-    /// The sides of the visit that alone leads to one, of joints that hardly move on a way
+    /// Return the sides of the only visit before one, for joints that hardly move on a path
     /// without a stop.
     fn near(&self, i: usize) -> [Option<f64>; 6] {
         let edge = self.first[i] as usize;
@@ -285,10 +286,9 @@ impl Settling<'_> {
         })
     }
 
-    /// The sides of a visit that is passed elsewhere by something, and what is known there
-    /// of the play.
+    /// Return the sides at a visit with a displacement of the path, and the play's state.
     ///
-    /// What plays did not tell stays as it was found.
+    /// Sides that do not follow from the play stay as they were found.
     fn arrived(&self, look: &Look, by: &Three) -> (Six, Clamp) {
         let (play, here) = self.led_to(look, by);
         let (found, half) = (&self.found[look.visit], &self.half);
@@ -296,15 +296,15 @@ impl Settling<'_> {
         (std::array::from_fn(|j| if look.known[j] { side(j) } else { found[j] }), play)
     }
 
-    /// What is known of the play at such a visit, and its angles.
+    /// Return the state of the play at such a visit, and its angles.
     fn led_to(&self, look: &Look, by: &Three) -> (Clamp, Six) {
         let (i, half) = (look.visit, &self.half);
         let edges = self.first[i] as usize..self.first[i + 1] as usize;
         if let (Some(way), Some(source)) = (&look.way, self.bends.before[i]) {
             let (mut clamp, here) = way.at(by, &look.moved);
-            if look.told.contains(&false) {
+            if look.blended.contains(&false) {
                 let led = self.led(edges.start, source, i, by);
-                for j in (0..6).filter(|j| !look.told[*j]) {
+                for j in (0..6).filter(|j| !look.blended[*j]) {
                     (clamp.lo[j], clamp.hi[j]) = (led.lo[j], led.hi[j]);
                 }
             }
@@ -327,7 +327,7 @@ impl Settling<'_> {
         (found.unwrap_or(within), here)
     }
 
-    /// What angles change by where a visit is passed elsewhere by something.
+    /// Return the change of the angles at a visit with a displacement of the path.
     fn answered(&self, i: usize, by: &Three) -> Six {
         if *by == STAYS {
             return [0.0; 6];
@@ -335,7 +335,7 @@ impl Settling<'_> {
         answered(&once(&self.answers, i, || self.answer(i)), by)
     }
 
-    /// The same from both of its ends alone, where corners do not tell of it.
+    /// Return the play operator of a path from its ends alone.
     fn led(&self, edge: usize, source: usize, i: usize, by: &Three) -> Clamp {
         let (begin, end) = (&self.angles[source], &self.angles[i]);
         let from = self.answered(source, &self.bends.shift[source]);
@@ -364,13 +364,13 @@ impl Settling<'_> {
         out
     }
 
-    /// Find how the place of a command answers the sides that it is made for.
+    /// Compute the derivatives of the place of a command by the sides of its aim.
     fn gain(&self, i: usize) -> Gain {
         let s = &self.states;
         let (q, side, tool) = (&s.q[i], &s.side[i], s.tool(i));
         let error = |side: &Six| {
-            let told = (s.load(i), s.given(i));
-            self.core.with_state((q, side), told.0, told.1, |state: &State<'_>| {
+            let (load, given) = (s.load(i), s.given(i));
+            self.core.with_state((q, side), load, given, |state: &State<'_>| {
                 self.core.error(state, tool)
             })
         };
@@ -384,7 +384,7 @@ impl Settling<'_> {
         })
     }
 
-    /// How angles of a command change where its place does, if little.
+    /// Compute the derivatives of the angles of a command by its place.
     fn answer(&self, i: usize) -> Answer {
         let q = &self.states.q[i];
         let mount = &self.tools[if self.tools.len() == 1 { 0 } else { i }];
@@ -406,7 +406,7 @@ impl Settling<'_> {
     }
 }
 
-/// What a command moves by where other sides are aimed for.
+/// Return the displacement of a command for other sides.
 fn moved(gain: &Gain, next: &Six, aim: &Six) -> Three {
     std::array::from_fn(|m| (0..6).map(|j| gain[j][m] * (next[j] - aim[j])).sum())
 }
@@ -415,11 +415,11 @@ fn largest(values: &Six) -> f64 {
     values.iter().fold(0.0, |most, value| if value.abs() > most { value.abs() } else { most })
 }
 
-/// Find sides that are their own answer, or nearly so.
+/// Find sides that are the same as their arrival, or nearly so.
 ///
-/// First they follow their answers, then from the flanks that lie ahead; where they creep
-/// or swing, Newton's method goes on from the best ones. A leap is taken where it
-/// brings more than its weight.
+/// A fixed-point iteration begins at the sides, then at the flanks that lie ahead. If it
+/// converges slowly or swings, Newton's method begins at the best sides. A leap must improve
+/// the agreement by more than its weight.
 fn agreed(answer: impl Fn(&Six) -> Six, begin: &Six, weight: &Six) -> Six {
     let off = |next: &Six| -> Six {
         let found = answer(next);
@@ -444,7 +444,7 @@ fn agreed(answer: impl Fn(&Six) -> Six, begin: &Six, weight: &Six) -> Six {
         let last = next;
         next = std::array::from_fn(|j| (next[j] + step[j]).clamp(-1.0, 1.0));
         if (0..6).all(|j| (next[j] - last[j]).abs() <= SETTLED) {
-            // It stays: go on with what comes behind.
+            // It has converged: begin the next method.
             look = match look {
                 look if look < GOES_ON => GOES_ON - 1,
                 look if look < 2 * GOES_ON => 2 * GOES_ON,
@@ -458,7 +458,7 @@ fn agreed(answer: impl Fn(&Six) -> Six, begin: &Six, weight: &Six) -> Six {
     best
 }
 
-/// Steps that lead to the flanks that lie ahead, where leaps have no weight.
+/// Return steps to the flanks that lie ahead, for joints whose leaps have no weight.
 fn to_flanks(step: &Six, weight: &Six) -> Six {
     std::array::from_fn(|j| {
         let far = step[j].abs() > AGREES && weight[j] == 0.0;
@@ -470,7 +470,7 @@ fn to_flanks(step: &Six, weight: &Six) -> Six {
     })
 }
 
-/// The step of Newton's method; where there is none, half of the way. What agrees stays.
+/// Return the step of Newton's method, or half of the disagreement if there is none.
 fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
     let columns = std::array::from_fn(|j| {
         if step[j].abs() <= SETTLED {
@@ -485,17 +485,16 @@ fn newton(off: &impl Fn(&Six) -> Six, at: &Six, step: &Six) -> Six {
     solve(columns, *step).unwrap_or_else(|| step.map(|part| part / 2.0))
 }
 
-/// Find the sides that n targets are to be corrected for, and those that they are reached
-/// from then, (n, 6), from the last look, and by what the path then passes them farther than
-/// they move, (n, 3) [m].
+/// Find the sides that n targets are to be corrected for, and the sides of their arrivals
+/// then, (n, 6), the displacements of the path without those of the targets, (n, 3) [m], and
+/// the states of the watched visits after each of s sweeps, (s w, 34).
 ///
 /// Args: the model and the inverse kinematics; commands (n, 4, 4) [m] and tools, likewise
-/// or (1, 4, 4); their states: joint angles of the commands, and the sides that they were
-/// made for; the ways that led to the visits; (6, 6), from joints to drives; which may be
-/// corrected for other sides, which are reached from others, and which the arm passes, (n,);
-/// by what the path misses places and is to be bent, (n, 3) [m]; what became of the first k
-/// in every sweep (s k, 34), where they were settled among others; and of which visits that
-/// is returned.
+/// or (1, 4, 4); their states: joint angles of the commands, and the sides of their aims; the
+/// paths to the visits; (6, 6), from joints to drives; which visits may get other sides,
+/// which arrivals are others, and which visits the arm passes, (n,); the distances by which
+/// the path misses places, (n, 3) [m]; the states of the first k visits after each sweep over
+/// the window before, (s k, 34); and the first and last visit that is watched.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what a look has found
 pub fn next_aims<'py>(
@@ -548,7 +547,7 @@ pub fn next_aims<'py>(
         passes: flat(&passes)?,
         missed: rows::<3>(&missed)?,
         answers: vec![OnceCell::new(); n],
-        told: vec![OnceCell::new(); n],
+        blended: vec![OnceCell::new(); n],
         play: known.clone(),
         known,
         bends,
@@ -560,7 +559,7 @@ pub fn next_aims<'py>(
     if !settling.is_sound() {
         return Err(PyIndexError::new_err("visits or edges that are not there"));
     }
-    let (lead, watched) = (rows::<SETTLED_AS>(&lead)?, watched.0..watched.1);
+    let (lead, watched) = (rows::<STATE>(&lead)?, watched.0..watched.1);
     let mut seen = Vec::with_capacity(SWEEPS as usize * watched.len());
     let led = n.min(lead.len() / (SWEEPS + LAST) as usize);
     settling.prepare();
@@ -568,11 +567,11 @@ pub fn next_aims<'py>(
         settling.holds = round >= SWEEPS;
         each(py, n, |i| {
             match lead.get(round as usize * led + i).filter(|_| i < led) {
-                Some(settled) => settling.follow(i, settled),
+                Some(state) => settling.follow(i, state),
                 None => settling.sweep(i, round),
             }
             if watched.contains(&i) {
-                seen.push(settling.settled(i));
+                seen.push(settling.state(i));
             }
         })?;
     }

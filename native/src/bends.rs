@@ -1,4 +1,4 @@
-//! How ways between rounded targets lie once these have moved: what the joints' play sees.
+//! Paths of joints between fly points after these have moved, as the play operator needs them.
 
 use std::cell::OnceCell;
 
@@ -7,7 +7,7 @@ use crate::play::Clamp;
 use crate::pull::across;
 use crate::rows::{Six, Three};
 
-const SAME: f64 = 1e-6; // [rad] a way that is told by its targets
+const SAME: f64 = 1e-6; // [rad] a path that follows from its targets
 const EVEN: f64 = 1e-6; // of its size: a zone that is as large before as behind
 const NOTHING: f64 = 1e-9; // [m] by which nothing moves
 const STAYS: Three = [0.0; 3];
@@ -87,7 +87,7 @@ impl Corner {
 /// How angles answer where a place moves along the axes of the base.
 pub type Answer = [Six; 3];
 
-/// Say what angles change by where a place moves.
+/// Return the change of angles for a displacement of the place.
 pub fn answered(answer: &Answer, by: &Three) -> Six {
     std::array::from_fn(|j| answer[0][j] * by[0] + answer[1][j] * by[1] + answer[2][j] * by[2])
 }
@@ -126,7 +126,7 @@ pub struct Bends<'a> {
     /// The visit before, where it alone leads there.
     pub before: Vec<Option<usize>>,
     pub half: Six,
-    /// What the path moves by where it passes the targets, and what they move by [m].
+    /// Displacements of the path where it passes the targets, and of the targets [m].
     pub shift: Vec<Three>,
     pub moved: Vec<Three>,
     /// Parts of the moves before and behind, and the path's direction, of rounded targets
@@ -134,7 +134,7 @@ pub struct Bends<'a> {
     pub corners: Vec<Option<Rounding>>,
 }
 
-/// A corner as it was found and as it becomes, and by what the path passed its target.
+/// A corner as it was found and as it will be, and how far the path passed its target.
 #[derive(Clone, Copy)]
 pub struct Rounding {
     found: Corner,
@@ -162,7 +162,7 @@ impl Bends<'_> {
         [less(&self.places[i - 1], &self.places[i]), less(&self.places[i + 1], &self.places[i])]
     }
 
-    /// Say what a target needs as its neighbours lie now.
+    /// Return the needs of a target as its neighbours lie now.
     fn need(&self, i: usize) -> Need {
         let mut need = STILL;
         if !self.corrected[i] {
@@ -210,7 +210,7 @@ impl Bends<'_> {
         self.round(i);
     }
 
-    /// Round a corner anew, as its targets lie now.
+    /// Round a corner again, as its targets lie now.
     fn round(&mut self, i: usize) {
         if let Some(mut own) = self.corners[i] {
             let (old, at) = (self.moves(i), &self.moved[i]);
@@ -221,7 +221,7 @@ impl Bends<'_> {
         }
     }
 
-    /// Tell whether nothing has moved that the way to a visit depends on.
+    /// Return True if no target has moved that the path to a visit depends on.
     pub fn is_quiet(&self, i: usize) -> bool {
         let near = &self.moved[i.saturating_sub(2)..(i + 2).min(self.moved.len())];
         near.iter().flatten().all(|by| *by == 0.0)
@@ -325,8 +325,8 @@ impl Way {
         (clamp, end)
     }
 
-    /// Tell of which joints it tells a way that was found, both at rest.
-    pub fn tells(&self, begin: &Six, found: &Clamp) -> [bool; 6] {
+    /// Return for each joint True if it is the path that was found, both at rest.
+    pub fn describes(&self, begin: &Six, found: &Clamp) -> [bool; 6] {
         let begin = Clamp::passing(begin, &self.half);
         let (own, found) = (begin.then(&self.at(&STAYS, &STAYS).0), begin.then(found));
         let same = |a: f64, b: f64| a == b || (a - b).abs() < SAME;

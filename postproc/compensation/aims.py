@@ -65,8 +65,8 @@ class NextAims:
         sides: The sides, (n, 6).
         reached: Those that they are reached from then, (n, 6): the same, but where none
             agree.
-        farther: By what the path then passes them farther than they move, (n, 3) [m].
-        seen: What became of those that are watched, sweep by sweep, (s w, 34).
+        farther: Displacements of the path without those of the targets, (n, 3) [m].
+        seen: States of the w watched targets after each of s sweeps, (s w, 34).
     """
 
     sides: Floats
@@ -75,7 +75,7 @@ class NextAims:
     seen: Floats
 
 
-UNLED_AIMS = np.zeros((0, 34))
+NO_STATES = np.zeros((0, 34))
 
 
 def next_aims(
@@ -87,22 +87,22 @@ def next_aims(
     free: Bools,
     off: Bools,
     missed: Floats,
-    lead: Floats = UNLED_AIMS,
+    lead: Floats = NO_STATES,
     watched: slice = slice(0, 0),
 ) -> NextAims:
     """Find the sides at which aim and arrival agree, target after target.
 
-    A correction moves its target, and so the place of every joint in its play there and
-    behind: by as much as the play is wide. A target is settled with what the ones
-    before it have become. Where the arrival answers the aim by more than the aim
-    changes, several sides agree: taken are those next to its own, and of joints that
-    hardly move on a way without a stop next to those of the target before. If none is
-    near there, the nearest miss is taken, not a leap that the next target would have to
-    take back.
+    A correction moves its target, and so the position of every joint in its play at
+    this target and at later ones, by up to the width of the play. So each target is
+    solved with the corrections of the targets before. If an arrival changes by more
+    than its aim, several sides agree. The solution is then the one next to the target's
+    own sides. For a joint that hardly moves on a path without a stop, it is the one
+    next to the sides of the target before. If no solution is near, the nearest miss is
+    used: a leap would have to be undone at the next target.
 
-    Corners are rounded anew as their targets move, so that a joint that turns back on
-    one is found where it will. Of curved ways and of moves of joints only both ends
-    count: what that misses, a further look at the program finds.
+    Blends are computed again as their targets move, so that reversals on them are
+    found. Of arcs and of JOINT moves only both ends count. The next plan of the program
+    finds the difference.
 
     Args:
         model: The arm's error.
@@ -112,9 +112,9 @@ def next_aims(
         corrected: The targets that move, (n,).
         free: Which may be corrected for other sides, (n,).
         off: .. and which are reached from others, (n,).
-        missed: By what the path misses places, and is to be bent, (n, 3) [m].
-        lead: What was `seen` of the first k of them, where they were settled before.
-        watched: Those of which that is to be seen.
+        missed: Distances by which the path misses places, (n, 3) [m].
+        lead: `seen` of the first k visits, from the window before.
+        watched: The visits whose states are returned as `seen`.
     """
     arm, evaluator = looked.arm, model.evaluator(looked.arm)
     ways = Ways.of(looked, corrected)

@@ -20,7 +20,7 @@ from postproc.arrays import (
     spans,
     take_rows,
 )
-from postproc.compensation.aims import UNLED_AIMS, NextAims, next_aims
+from postproc.compensation.aims import NO_STATES, NextAims, next_aims
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.arc_turns import ArcTurns
 from postproc.compensation.consensus import (
@@ -481,7 +481,7 @@ class _Course:
 
     def settle(self, turn: int, *given: Any) -> NextAims:
         """Find what to correct targets for next, see `Iteration.find_aims`."""
-        lead = self.lead.settled.get(turn, UNLED_AIMS)
+        lead = self.lead.settled.get(turn, NO_STATES)
         found = self.iteration.find_aims(lead, self.trail.seam, *given)
         self.trail.settled[turn] = found.seen
         return found
