@@ -148,10 +148,13 @@ def states(
 ) -> tuple[Floats, Floats]: ...
 def side(angles: Floats, z: _Clamps, half: Floats) -> Floats: ...
 
-# lines.rs, pull.rs: straight paths, how corners pull (`postproc.motion.path`)
+# lines.rs, segments.rs, pull.rs: paths, how corners pull (`postproc.motion.path`)
 def lines(
     flange: Floats, tool: Floats, begin: Ints, end: Ints
 ) -> tuple[Floats, Floats, Floats, Floats]: ...
+def poses_along(
+    segments: Floats, path: Ints, share: Floats, tools: Floats, tool: Ints
+) -> Floats: ...
 def to_move(
     wanted: Floats,
     corners: tuple[Ints, Ints, Ints],

@@ -32,6 +32,7 @@ mod pull;
 mod rescan;
 mod rounding;
 mod rows;
+mod segments;
 mod shares;
 mod solver;
 mod spans;
@@ -71,6 +72,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rounding::rounded, module)?)?;
     module.add_function(wrap_pyfunction!(zones::zones, module)?)?;
     module.add_function(wrap_pyfunction!(lines::lines, module)?)?;
+    module.add_function(wrap_pyfunction!(segments::poses_along, module)?)?;
     module.add_function(wrap_pyfunction!(turns::into_range, module)?)?;
     module.add_function(wrap_pyfunction!(turns::on_turns, module)?)?;
     module.add_function(wrap_pyfunction!(turns::on_other_turns, module)?)?;

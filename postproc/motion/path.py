@@ -8,12 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, chunks, few_rows, floats
+from postproc.arrays import Bools, Floats, Ints, few_rows, floats
 from postproc.motion.targets import Targets
 from postproc.robot.pose import (
     inverse,
     lengths,
-    rotation_from_vector,
     rotation_vector,
 )
 from postproc.robot.trajectory import Motion
@@ -28,6 +27,9 @@ TURN = np.deg2rad(1.0)  # [rad] between samples
 MOST = 2000  # samples of one path
 COLLINEAR = 1e-6  # sine of the angle at VIA below which three points make no circle
 APART = 1e-6  # [m] nor do they where two are nearer: rounding alone would place it
+
+
+NO_TOOLS, NO_TOOL = np.empty((0, 4, 4)), np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -75,16 +77,21 @@ class Segments:
 
     def poses(self, path: Ints, u: Floats) -> Floats:
         """Place the TCP on paths `path` (s,) at fractions u (s,): (s, 4, 4)."""
-        phi = (u * self.angle[path])[:, None]
-        T = np.zeros((len(u), 4, 4))
-        T[:, :3, 3] = self.centre[path] + u[:, None] * self.chord[path]
-        T[:, :3, 3] += (
-            np.cos(phi) * self.radius[path] + np.sin(phi) * self.tangent[path]
-        )
-        turned = rotation_from_vector(u[:, None] * self.turn[path])
-        T[:, :3, :3] = self.rotation[path] @ turned
-        T[:, 3, 3] = 1.0
-        return T
+        return self.flanges(path, u, NO_TOOLS, NO_TOOL)
+
+    def flanges(self, path: Ints, u: Floats, tools: Floats, tool: Ints) -> Floats:
+        """Place the flange on paths: (s, 4, 4).
+
+        Args:
+            path: Paths, (s,).
+            u: Fractions of them, (s,).
+            tools: In the flange frame, (t, 4, 4) [m].
+            tool: The one of every path, (m,).
+        """
+        parts = (self.turn, self.centre, self.radius, self.tangent, self.chord)
+        rotation = self.rotation.reshape(-1, 9)
+        packed = np.column_stack([rotation, *parts, self.angle])
+        return _native.poses_along(floats(packed), path, floats(u), tools, tool)
 
 
 def lines(begin: Floats, end: Floats) -> Segments:
@@ -182,7 +189,6 @@ def join_segments(parts: list[Segments]) -> Segments:
 # Samples of the Cartesian paths whose both ends are known before joint angles are.
 
 LEAST = 4  # intervals of a path between stops, however short
-AT_ONCE = 16_384  # samples that are placed at a time
 BLIND = 32  # intervals of a path whose length is not known beforehand
 
 
@@ -284,11 +290,9 @@ class _Ends:
         path = np.repeat(np.arange(len(edge)), inner)
         first = np.concatenate([[0], np.cumsum(np.bincount(path, minlength=len(edge)))])
         nth = np.arange(len(path)) - first[path]
-        share, flange = (nth + 1) / intervals[path], np.empty((len(path), 4, 4))
-        for rows in chunks(len(path), AT_ONCE):
-            tool = self.targets.tool.take(self.visit[edge[path[rows]]], axis=0)
-            tcp = segments.poses(path[rows], share[rows])
-            np.matmul(tcp, inverse(tool), out=flange[rows])
+        tools = floats(few_rows(self.targets.tool))
+        tool = self.visit[edge] if len(tools) > 1 else np.zeros(len(edge), dtype=int)
+        flange = segments.flanges(path, (nth + 1) / intervals[path], tools, tool)
         return Samples(
             self.visit, self.source, self.cartesian, ready, broken, self.begins, start,
             length, turning, inner=start[edge[path]] + nth, flange=flange,
