@@ -29,10 +29,9 @@ from postproc.robot.arm import DH
 from postproc.robot.backlash_operator import (
     NOTHING,
     Edges,
+    LastReversal,
     PlayOperator,
     chains_of,
-    passing,
-    prefix,
 )
 from postproc.robot.inverse import ClosedForm
 from postproc.robot.pose import rotation_from_vector
@@ -201,15 +200,18 @@ def test_one_branch(bench_cell, random, laid_out):
     assert np.allclose(np.nan_to_num(off), 0.0, atol=1e-7)
 
 
-def test_play(random, laid_out):
+def test_reversals(random, laid_out):
     q = laid_out(np.cumsum(random.normal(size=(500, 6)), axis=0))
-    q[123:124], begins = np.nan, laid_out(random.random(500) < 0.02)
-    begins[124:125] = True
-    steps = PlayOperator(*map(np.ascontiguousarray, (q - 0.7, q + 0.7)))
-    for how in (None, np.ascontiguousarray(begins)):
-        found, meant = prefix(steps, how), plain.prefix(steps, how)
-        assert np.array_equal(found.lo, meant.lo, equal_nan=True)
-        assert np.array_equal(found.hi, meant.hi, equal_nan=True)
+    q[400:401] = np.nan
+    before = LastReversal(np.sign(random.normal(size=6)), *random.normal(size=(2, 6)))
+    play, at = random.uniform(0.1, 2.0, 6), np.flatnonzero(random.random(len(q)) < 0.4)
+    found = backlash_operator.along(q, before, play, at)
+    meant = plain.reversals(q, before, play)[:, at]
+    for one, other in zip((found.side, found.angle, found.z), meant, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    for wrong in ([3, 2], [500]):
+        with pytest.raises(IndexError, match="not there"):
+            backlash_operator.along(q, before, play, np.array(wrong))
 
 
 def test_walks_with_turning_values(random):
@@ -231,7 +233,9 @@ def test_walks_with_turning_values(random):
     assert np.array_equal(passed.lo, wanted.lo) and np.array_equal(passed.hi, wanted.hi)
 
 
-@pytest.mark.parametrize("given", [NOTHING.play, passing(np.zeros((1, 6)), np.ones(6))])
+@pytest.mark.parametrize(
+    "given", [NOTHING.play, plain.passing(np.zeros((1, 6)), np.ones(6))]
+)
 def test_states_in_a_graph(given, random):
     # Loops, jumps, unknown places and visits with several ways to them.
     n = 200
@@ -243,7 +247,7 @@ def test_states_in_a_graph(given, random):
     q = np.cumsum(random.normal(size=(n, 6)), axis=0)
     q[random.random(n) < 0.03] = np.nan
     chains, half = chains_of(q, np.eye(6), first, source), np.full(6, 0.8)
-    steps = passing(chains.angles[np.repeat(np.arange(n), count)], half)
+    steps = plain.passing(chains.angles[np.repeat(np.arange(n), count)], half)
     asked = chains, steps, half, given
     found, meant = direction._states(*asked), plain.states(*asked)
     assert np.array_equal(found.lo, meant.lo, equal_nan=True)

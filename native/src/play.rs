@@ -1,9 +1,10 @@
 //! The play operator: `postproc.robot.backlash_operator`.
 
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, each, flat, rows, same_length, Six};
+use crate::rows::{array, each, flat, row, rows, same_length, Six};
 
 type Block<'py> = Bound<'py, PyArray2<f64>>;
 
@@ -130,19 +131,48 @@ pub fn sides_along<'py>(
     Ok(ends(py, &sides))
 }
 
-/// Compose the steps (n, 6) since the last beginning up to each one.
+/// `LastReversal` of the package, at one moment or at several.
+#[derive(FromPyObject)]
+pub struct Reversals<'py> {
+    side: PyReadonlyArray1<'py, f64>,
+    angle: PyReadonlyArray1<'py, f64>,
+    z: PyReadonlyArray1<'py, f64>,
+}
+
+/// Follow drive-side angles (s, 6) from the last reversal before them; return the last
+/// reversals at samples `at` (k,), ascending: side, angle and state of the play, (k, 6).
+///
+/// A reversal is a return by more than twice `half`, (6,).
 #[pyfunction]
-pub fn prefix<'py>(
+pub fn reversals<'py>(
     py: Python<'py>,
-    steps: Clamps<'py>,
-    begins: PyReadonlyArray1<'py, bool>,
-) -> PyResult<Ends<'py>> {
-    let (mut steps, begins) = (steps.list()?, flat(&begins)?);
-    same_length(&[steps.len(), begins.len()])?;
-    each(py, steps.len(), |i| {
-        if i > 0 && !begins[i] {
-            steps[i] = steps[i - 1].then(&steps[i]);
+    values: PyReadonlyArray2<'py, f64>,
+    at: PyReadonlyArray1<'py, i64>,
+    before: Reversals<'py>,
+    half: PyReadonlyArray1<'py, f64>,
+) -> PyResult<(Block<'py>, Block<'py>, Block<'py>)> {
+    let (values, at, half) = (rows::<6>(&values)?, flat(&at)?, row(&half)?);
+    let (mut side, mut angle, mut z) = (row(&before.side)?, row(&before.angle)?, row(&before.z)?);
+    let (mut found, mut wanted) = ([const { Vec::<Six>::new() }; 3], at.iter().peekable());
+    each(py, values.len(), |i| {
+        for j in 0..6 {
+            let new = smaller(larger(z[j], values[i][j] - half[j]), values[i][j] + half[j]);
+            let turned = new - z[j];
+            let turned = if turned == 0.0 { side[j] } else { turned.signum() };
+            if turned != side[j] {
+                angle[j] = z[j] + side[j] * half[j];
+            }
+            (side[j], z[j]) = (turned, new);
+        }
+        while wanted.next_if(|at| **at == i as i64).is_some() {
+            for (column, row) in found.iter_mut().zip([side, angle, z]) {
+                column.push(row);
+            }
         }
     })?;
-    Ok(ends(py, &steps))
+    if wanted.next().is_some() {
+        return Err(PyIndexError::new_err("samples that are not there, or not ascending"));
+    }
+    let [side, angle, z] = found.map(|column| array(py, column));
+    Ok((side, angle, z))
 }

@@ -46,7 +46,8 @@ def read_directions(arm: Arm, cycle: ProgramCycle) -> Floats:
             continue
         came_from = source[head]
         start = cycle.path.q[came_from] @ arm.coupling.T if came_from >= 0 else q[a]
-        found = along(q[a:b], never_turned(start), arm.play).side
+        every = np.arange(b - a)
+        found = along(q[a:b], never_turned(start), arm.play, every).side
         rows = np.arange(visit[a], visit[b - 1] + 1)
         rows = rows[last[rows] >= a]
         side[rows] = found[last[rows] - a]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.arrays import Floats, Ints, any_in_rows, floats
 
 # The play operator: what a joint with backlash remembers of its path.
 #
@@ -41,22 +41,6 @@ class PlayOperator:
 def identity(shape: tuple[int, ...]) -> PlayOperator:
     """Return maps that change nothing."""
     return PlayOperator(np.full(shape, -np.inf), np.full(shape, np.inf))
-
-
-def passing(q: Floats, half_width: Floats) -> PlayOperator:
-    """Return the clamp of passing each angle (..., 6) [rad]."""
-    return PlayOperator(q - half_width, q + half_width)
-
-
-def prefix(steps: PlayOperator, begins: Bools | None = None) -> PlayOperator:
-    """Compose all steps since the last beginning up to each one, (n, 6) -> (n, 6).
-
-    Args:
-        steps: The steps of several sequences, one after the other.
-        begins: With which steps a sequence begins, (n,), beside the first one.
-    """
-    begins = np.zeros(len(steps.lo), dtype=bool) if begins is None else begins
-    return PlayOperator(*_native.prefix(steps, begins))
 
 
 # A graph of visits on the drive side, cut into chains that need no loop inside.
@@ -256,37 +240,27 @@ def last_reversals(
             last.z[head] = at_head.z
             if chains.ends[c] > head + 1:
                 samples, visits = ways.of(chains.body(c))
-                since = along(samples, at_head, play)
+                since = along(samples, at_head, play, visits)
                 rows = slice(head + 1, chains.ends[c])
-                last.side[rows] = since.side[visits]
-                last.angle[rows] = since.angle[visits]
-                last.z[rows] = since.z[visits]
+                last.side[rows], last.angle[rows] = since.side, since.angle
+                last.z[rows] = since.z
             seen[head : chains.ends[c]] = True
     return last
 
 
-def along(values: Floats, before: LastReversal, play: Floats) -> LastReversal:
+def along(values: Floats, before: LastReversal, play: Floats, at: Ints) -> LastReversal:
     """Follow a path.
 
     Args:
         values: Drive-side angles, (s, 6) [rad].
         before: The last reversal before that, (6,).
         play: A return of more than this is a reversal, (6,) [rad].
+        at: The k samples asked for, ascending.
+
+    Returns:
+        The last reversals there, (k, 6).
     """
-    half = play / 2
-    z = np.vstack([before.z, prefix(passing(values, half))(before.z)])
-    side = np.sign(np.diff(z, axis=0))
-    side = np.vstack([before.side, side])
-    rows = np.arange(len(side))[:, None]
-    moved = np.maximum.accumulate(np.where(side != 0, rows, 0), axis=0)
-    side = np.take_along_axis(side, moved, axis=0)
-    turned = np.zeros(side.shape, dtype=bool)
-    turned[1:] = side[1:] != side[:-1]
-    angle = np.empty(side.shape)
-    angle[0] = before.angle
-    angle[1:] = z[:-1] + side[:-1] * half
-    at = np.maximum.accumulate(np.where(turned, rows, 0), axis=0)
-    return LastReversal(side[1:], np.take_along_axis(angle, at, axis=0)[1:], z[1:])
+    return LastReversal(*_native.reversals(floats(values), at, before, play / 2))
 
 
 def _merge_pasts(
@@ -312,7 +286,8 @@ def _merge_pasts(
             z = chains.angles[source] - side * half
             before = LastReversal(side, last.angle[source], z)
             samples, _ = ways.of(slice(edge, edge + 1))
-            pasts.append(along(samples, before, play)[-1])
+            end = np.array([len(samples) - 1])
+            pasts.append(along(samples, before, play, end)[0])
     if not pasts:
         return never_turned(q)
     side = np.array([p.side for p in pasts])

@@ -9,14 +9,22 @@ import numpy as np
 from postproc.robot.backlash_operator import PlayOperator, VisitChains
 
 
-def prefix(steps, begins=None):
-    """Compose the steps since the last beginning up to each one."""
-    lo, hi = np.array(steps.lo), np.array(steps.hi)
-    for i in range(1, len(lo)):
-        if begins is None or not begins[i]:
-            before = PlayOperator(lo[i - 1], hi[i - 1]).then(PlayOperator(lo[i], hi[i]))
-            lo[i], hi[i] = before.lo, before.hi
-    return PlayOperator(lo, hi)
+def passing(q, half):
+    """Return the clamps of passing each angle."""
+    return PlayOperator(q - half, q + half)
+
+
+def reversals(values, before, play):
+    """Follow a path sample by sample: side, angle and state of the play, (s, 6)."""
+    side, angle, z = (np.array(x) for x in (before.side, before.angle, before.z))
+    found = []
+    for q in values:
+        new = np.minimum(np.maximum(z, q - play / 2), q + play / 2)
+        turned = np.where(new == z, side, np.sign(new - z))
+        angle = np.where(turned == side, angle, z + side * play / 2)
+        side, z = turned, new
+        found.append((side, angle, z))
+    return np.swapaxes(np.reshape(found, (-1, 3, 6)), 0, 1)
 
 
 def clamps(values, start, half):

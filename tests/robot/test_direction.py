@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,8 +13,6 @@ from postproc.robot.backlash_operator import (
     Edges,
     PlayOperator,
     _insert_turning_values,
-    passing,
-    prefix,
 )
 from postproc.robot.direction import (
     WIDTH_IN_PLAYS,
@@ -53,30 +50,6 @@ def one_joint(arm: Arm, plays: list[float], joint: int = 0) -> Arrivals:
 
 
 angles = st.floats(-3.0, 3.0, allow_nan=False)
-
-
-@given(arrays(float, st.tuples(st.integers(1, 70), st.just(6)), elements=angles))
-@settings(max_examples=60, deadline=None)
-def test_composed_clamps_are_the_sequential_operator(q: np.ndarray) -> None:
-    half = 0.4
-    composed = prefix(passing(q, np.array(half)))
-    for z0 in (q[0] - half, q[0], q[0] + half):
-        np.testing.assert_array_equal(composed(z0), sequential(q, z0, half))
-
-
-@given(
-    arrays(float, st.tuples(st.integers(1, 90), st.just(6)), elements=angles),
-    st.lists(st.integers(0, 89), max_size=12),
-)
-@settings(max_examples=100, deadline=None)
-def test_sequences_one_after_the_other_do_not_touch(q, begins) -> None:
-    starts = sorted({0, *(b for b in begins if b < len(q))})
-    new = np.isin(np.arange(len(q)), starts[1:])
-    composed = prefix(passing(q, np.array(0.4)), new)
-    for first, end in pairwise([*starts, len(q)]):
-        alone = prefix(passing(q[first:end], np.array(0.4)))
-        np.testing.assert_array_equal(composed.lo[first:end], alone.lo)
-        np.testing.assert_array_equal(composed.hi[first:end], alone.hi)
 
 
 @given(arrays(float, (3, 2, 4), elements=angles), arrays(float, 4, elements=angles))
