@@ -1,10 +1,10 @@
 //! Places on the sampled paths of edges: `postproc.motion.blending`.
 
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use crate::rows::{flat, rows, Six};
+use crate::rows::{array, each, flat, rows, same_length, Six};
 
 /// `Edges` of the package.
 #[derive(FromPyObject)]
@@ -88,6 +88,16 @@ impl Way<'_> {
         std::array::from_fn(|j| self.samples[0][j] - self.from[j])
     }
 
+    /// Interpolate at the fraction u < 1 between the samples before and behind.
+    pub fn straight_at(&self, u: f64) -> Six {
+        let place = u * self.samples.len() as f64;
+        let before = place.floor();
+        let i = (before as usize).min(self.samples.len() - 1);
+        let begin = if i == 0 { self.from } else { &self.samples[i - 1] };
+        let end = &self.samples[i];
+        std::array::from_fn(|j| begin[j] + (place - before) * (end[j] - begin[j]))
+    }
+
     /// Interpolate at the fraction u: straight, or a parabola through three samples.
     pub fn at(&self, u: f64) -> Six {
         if let [end] = self.samples {
@@ -106,4 +116,22 @@ impl Way<'_> {
             here[j] + t * slope + t * t / 2.0 * bend
         })
     }
+}
+
+/// Interpolate joint angles at fractions (k,) < 1 of edges (k,): (k, 6) [rad].
+///
+/// Args: the edges; joint angles at the visits, (n, 6) [rad]; the edges asked for, which
+/// come from known visits.
+#[pyfunction]
+pub fn along_edges<'py>(
+    py: Python<'py>,
+    edges: Edges<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+    edge: PyReadonlyArray1<'py, i64>,
+    share: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (paths, edge, share) = (Paths::of(&edges, &q)?, flat(&edge)?, flat(&share)?);
+    let n = same_length(&[edge.len(), share.len()])?;
+    let found = each(py, n, |i| paths.way(edge[i]).map(|way| way.straight_at(share[i])))?;
+    Ok(array(py, found.into_iter().collect::<PyResult<_>>()?))
 }

@@ -79,7 +79,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
     module.add_function(wrap_pyfunction!(numeric::numeric_branches, module)?)?;
-    module.add_function(wrap_pyfunction!(numeric::numeric_slots, module)?)?;
+    module.add_function(wrap_pyfunction!(edges::along_edges, module)?)?;
     module.add_function(wrap_pyfunction!(play::reversals, module)?)?;
     module.add_function(wrap_pyfunction!(play::sides_along, module)?)?;
     module.add_function(wrap_pyfunction!(direction::states, module)?)?;

@@ -3,12 +3,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use numpy::{IntoPyArray, PyArray1, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray3, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
 use crate::lines::{poses, Pose};
-use crate::rows::{blocks, dot, each, minus, rows, Six, Three};
+use crate::rows::{blocks, dot, each, minus, Six, Three};
 use crate::walk::cross;
 
 const STARTS: usize = 160;
@@ -272,15 +272,4 @@ pub fn numeric_branches<'py>(
         before
     })?;
     Ok(blocks(py, poses.len(), (8, 6), out.into_flattened().into_flattened()))
-}
-
-/// Name the branches of joint angles (n, 6) [rad], (n,).
-#[pyfunction]
-pub fn numeric_slots<'py>(
-    py: Python<'py>,
-    parameters: Parameters<'py>,
-    q: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Bound<'py, PyArray1<i64>>> {
-    let (numeric, q) = (Numeric::new(&parameters)?, rows::<6>(&q)?);
-    Ok(each(py, q.len(), |i| numeric.slot(&q[i]) as i64)?.into_pyarray(py))
 }

@@ -1,6 +1,8 @@
 //! The inverse kinematics of one arm, from one pose to the next: `postproc.robot.inverse`.
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -75,6 +77,21 @@ impl Solver {
         let (mix, unmix) = (square(&mixes.0)?, square(&mixes.1)?);
         let arm = Arm::new(flat(&closed)?)?;
         Ok(Solver(Form::Closed(Box::new(Mixed { arm, mix, unmix }))))
+    }
+
+    /// Name the branches (slot 4 W + 2 S + E) of joint angles (n, 6) [rad], (n,); of unknown
+    /// angles the name has no meaning.
+    fn slots<'py>(
+        &self,
+        py: Python<'py>,
+        q: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<i64>>> {
+        let q = rows::<6>(&q)?;
+        let one = |i: usize| match &self.0 {
+            Form::Closed(form) => form.arm.slot(&mixed(&form.mix, &q[i])),
+            Form::Numeric(numeric) => numeric.slot(&q[i]) as i64,
+        };
+        Ok(in_parts(py, q.len(), WORTH, |some| some.map(one).collect())?.into_pyarray(py))
     }
 
     /// Solve flange poses (n, 4, 4) [m] on branches (n,) next to joint angles (n, 6):

@@ -158,8 +158,11 @@ def path_departure(
     joints, branch = np.array(at.joints), np.array(at.branch)
     sizes = np.column_stack([at.elbow, at.wrist_centre, at.tcp])
     inside = _measure(arm, some.old, some.new, tool[some.visit], offset)
+    first = np.flatnonzero(np.diff(some.visit, prepend=-1))
+    rows = some.visit[first]
     for largest, found in zip((joints, sizes), inside, strict=True):
-        np.fmax.at(largest, some.visit, found)
+        most = np.fmax.reduceat(found, first, axis=0)
+        largest[rows] = np.fmax(largest[rows], most)
     way = move[some.visit] != Motion.JOINT  # joints may pass a singularity as they like
     other = other_branch(arm, some.old[way], some.new[way])
     branch[some.visit[way][other]] = True
@@ -182,19 +185,6 @@ def _samples(visit: Ints, count: Ints, old: Trace, new: Trace) -> _Samples:
     of = np.repeat(edge, count)
     step = spans(np.ones(len(edge), dtype=np.int64), count)
     part = step / np.repeat(count + 1, count)
-    both = [_along(trace, of, part) for trace in (old, new)]
+    both = [_native.along_edges(t.edges, t.q, of, part) for t in (old, new)]
     good = ~any_in_rows(np.isnan(both[0] + both[1]))
     return _Samples(visit[of[good]], both[0][good], both[1][good])
-
-
-def _along(trace: Trace, edge: Ints, part: Floats) -> Floats:
-    """Give joint angles at a part of the way along edges, (k, 6) [rad]."""
-    edges = trace.edges
-    place = part * np.diff(edges.start)[edge]
-    before = np.floor(place).astype(np.int64)
-    at = edges.start[edge] + before
-    begin = np.where(
-        (before > 0)[:, None], edges.path[at - 1], trace.q[edges.source[edge]]
-    )
-    inner = (place - before)[:, None]
-    return np.asarray(begin + inner * (edges.path[at] - begin))

@@ -20,8 +20,6 @@ from postproc.robot.pose import MM
 # problem of industrial serial manipulators with an ortho-parallel basis and a spherical
 # wrist (2014). For one branch alone where that is known: a correction stays on it.
 
-WRIST, SHOULDER, ELBOW = 4, 2, 1  # bits of a slot
-
 
 class ClosedForm:
     """The closed form of one arm, in its geometric joint angles.
@@ -33,14 +31,12 @@ class ClosedForm:
     def __init__(self, parameters: OpwSection) -> None:
         """Take the arm file's section."""
         p = parameters
-        self._a1, self._b, self._c1 = p.a1_mm * MM, p.b_mm * MM, p.c1_mm * MM
-        self._upper, self._c4 = p.c2_mm * MM, p.c4_mm * MM
-        self._forearm = float(np.hypot(p.a2_mm, p.c3_mm)) * MM
-        self._bent = float(np.arctan2(p.a2_mm, p.c3_mm))
-        self._offset = np.deg2rad(p.offsets_deg)
-        self._sign = np.where(p.flip_axes, -1.0, 1.0)
-        lengths = self._a1, self._b, self._c1, self._upper, self._forearm, self._c4
-        self._packed = np.array([*lengths, self._bent, *self._offset, *self._sign])
+        forearm = np.hypot(p.a2_mm, p.c3_mm)
+        lengths_mm = p.a1_mm, p.b_mm, p.c1_mm, p.c2_mm, forearm, p.c4_mm
+        self._packed = np.array([
+            *(length * MM for length in lengths_mm), np.arctan2(p.a2_mm, p.c3_mm),
+            *np.deg2rad(p.offsets_deg), *np.where(p.flip_axes, -1.0, 1.0),
+        ])  # fmt: skip
 
     def branches(self, flange: Floats) -> Floats:
         """Solve for all branches of every pose.
@@ -72,18 +68,6 @@ class ClosedForm:
         """Return what goes from pose to pose, see `Inverse.nearest`."""
         return _native.Solver.of_closed_form(self._packed, (floats(mix), floats(unmix)))
 
-    def slot(self, theta: Floats) -> Ints:
-        """Name the branch of geometric joint angles (n, 6) [rad], (n,)."""
-        t = theta * self._sign - self._offset
-        elbow = t[:, 2] + self._bent
-        ahead = self._upper * np.sin(t[:, 1]) + self._forearm * np.sin(t[:, 1] + elbow)
-        slots: Ints = (
-            WRIST * (np.sin(t[:, 4]) < 0)
-            + SHOULDER * (self._a1 + ahead < 0)
-            + ELBOW * (np.sin(elbow) < 0)
-        )
-        return slots
-
 
 class NumericForm:
     """The inverse kinematics of any chain with six axes, in the controller's angles.
@@ -111,10 +95,6 @@ class NumericForm:
     def solver(self, mix: Floats, unmix: Floats) -> _native.Solver:
         """Return what goes from pose to pose; its angles are the controller's."""
         return _native.Solver.of_chain(self._packed)
-
-    def slot(self, theta: Floats) -> Ints:
-        """Name the branch of joint angles (n, 6) [rad], (n,)."""
-        return _native.numeric_slots(self._packed, floats(theta))
 
 
 # Inverse kinematics of an arm: all branches or one, on turns within its range.
@@ -188,7 +168,7 @@ class Inverse:
 
     def slot(self, q: Floats) -> Ints:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
-        return self._form.slot(q @ self._mix.T)
+        return self.solver.slots(floats(q))
 
     def into_range(self, q: Floats) -> Floats:
         """Shift angles by whole turns into the joint range where that is possible."""
