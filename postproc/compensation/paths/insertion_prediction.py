@@ -181,10 +181,10 @@ class InsertionTask:
         keys = self.windows.list_keys(plan)
         own = self.windows.of_visits(plan.points)
         if not self._know(plan, keys, own.tolist()):
-            return self.predict_whole(plan)
+            return self._predict_all(plan, keys)
         behind = self._list_changed_behind(keys, own)
         if not self._know(plan, keys, behind):
-            return self.predict_whole(plan)
+            return self._predict_all(plan, keys)
         part = np.zeros(len(self.visits), dtype=np.int64)
         parts = {self._source: 0}  # no two of them are equal
         for k in (*own.tolist(), *behind):
@@ -198,6 +198,24 @@ class InsertionTask:
         """Predict those of some windows that are new; see `_predict_windows`."""
         new = [k for k in some if (k, keys[k]) not in self._parts]
         return not new or self._predict_windows(plan, keys, new)
+
+    def _predict_all(
+        self, plan: InsertionPlan, keys: Mapping[int, Key]
+    ) -> PathPrediction:
+        """Predict the whole program, and keep what it says of every window."""
+        found = self.predict_whole(plan)
+        (part,) = found.parts
+        if self._is_where_it_was(part, np.ones(len(self.visits), dtype=bool)):
+            self._keep(part, keys, list(keys))
+        return found
+
+    def _keep(self, part: Part, keys: Mapping[int, Key], some: Sequence[int]) -> None:
+        """Keep the prediction of some windows, and note which end as in the source."""
+        self._parts.update({(k, keys[k]): part for k in some})
+        travels = "travel" in self.setting.model.needs
+        alike = part.ends_as(self.first.after, self.windows.end[list(some)], travels)
+        pairs = zip(some, alike.tolist(), strict=True)
+        self._settled.update((k, keys[k]) for k, settled in pairs if settled)
 
     def _list_changed_behind(self, keys: Mapping[int, Key], own: Ints) -> list[int]:
         """List the windows that others with points before them may change.
@@ -346,11 +364,7 @@ class InsertionTask:
         part = self._run(plan, reading, again, kept, mine, owner)
         if not self._is_where_it_was(part, inside):
             return False
-        self._parts.update({(k, keys[k]): part for k in some})
-        travels = "travel" in self.setting.model.needs
-        alike = part.ends_as(self.first.after, windows.end[list(some)], travels)
-        pairs = zip(some, alike.tolist(), strict=True)
-        self._settled.update((k, keys[k]) for k, settled in pairs if settled)
+        self._keep(part, keys, some)
         return True
 
     def _is_where_it_was(self, part: Part, inside: Bools) -> bool:
