@@ -32,7 +32,6 @@ from postproc.robot.direction import half_width
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
-LEAST = 400  # visits of a program; shorter ones are predicted as a whole
 MOST = 0.6  # of the visits: more are predicted as a whole
 BACK = 60  # visits of a run-up; where they do not tell, the program's start does
 MARGIN = 5e-3  # [rad] that a joint turns beyond its gap: what corrections move it by

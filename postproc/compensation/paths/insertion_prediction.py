@@ -171,12 +171,10 @@ class InsertionTask:
     def predict(self, plan: InsertionPlan) -> PathPrediction:
         """Correct the program with the points of a plan, and predict it.
 
-        Only windows whose points, or whose run-up's, have not been predicted lately,
-        and those behind them where links lie otherwise; of short programs, and where
-        that is most of it, all.
+        Only windows whose points, or whose run-up's, have not been predicted, and those
+        behind them where links lie otherwise; all where that is most of the program.
         """
-        short = len(self.visits) < changed_windows.LEAST
-        if plan.approaches or (plan.points and short):
+        if plan.approaches:
             return self.predict_whole(plan)
         keys = self.windows.list_keys(plan)
         own = self.windows.of_visits(plan.points)

@@ -29,7 +29,7 @@ HIT = 5e-3  # [mm] as near as rounded points are hit, by the rounds that others 
 
 @pytest.fixture
 def in_windows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Predict short programs in windows too; count those that were."""
+    """Predict in windows whatever changes; count what is."""
     counted: list[int] = []
     taken = changed_windows.take_windows
 
@@ -39,21 +39,24 @@ def in_windows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     name = "postproc.compensation.paths.insertion_prediction.take_windows"
     monkeypatch.setattr(name, count)
-    monkeypatch.setattr(changed_windows, "LEAST", 0)
     monkeypatch.setattr(changed_windows, "MOST", 1.0)
     return counted
 
 
 @pytest.mark.parametrize("name", ["points", "stops"])
 def test_the_output_is_that_of_whole_predictions(
-    shop: Path, in_windows: list[int], name: str
+    shop: Path, in_windows: list[int], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     more = ("--set", STOPS) if name == "stops" else ()
     asked = ("--path-tolerance", TOLERANCE, *more)
     compensated(shop, "job.pdl", f"windows-{name}", *asked)
     assert in_windows, "nothing was predicted in windows"
+    monkeypatch.setattr(changed_windows, "MOST", -1.0)
+    count = len(in_windows)
+    compensated(shop, "job.pdl", f"whole-{name}", *asked)
+    assert len(in_windows) == count
     own, other = (
-        (shop / f"{one}.pdl").read_text() for one in (f"windows-{name}", name)
+        (shop / f"{kind}-{name}.pdl").read_text() for kind in ("windows", "whole")
     )
     assert NUMBER.sub("", own) == NUMBER.sub("", other)
     numbers = [np.array(NUMBER.findall(text), dtype=float) for text in (own, other)]
