@@ -160,7 +160,7 @@ def _literals(programs: Sequence[Visits]) -> Literals:
 # a halo on either side. How far things really reach is not guessed: windows must find
 # the same at the targets beside a cut, round by round (see `parallel`).
 
-LEAST = 30_000  # visits of a window; shorter programs are one
+LEAST = 25_000  # visits of a window; shorter programs are one
 HALO = 400  # visits on either side; a round reaches some 20, and LONG ones are long
 BAND = 32  # visits on either side of a cut that both must agree on
 SEAM = 16  # first visits that are settled as the window before has settled them
@@ -249,8 +249,8 @@ def windows(quiet: Bools, least: int) -> list[Window]:
 def share(n: int, threads: int) -> int:
     """Return the visits of a window of n: every thread gets as many windows.
 
-    >>> [share(n, 2) for n in (60_000, 100_000, 1_000_000)]
-    [30000, 50000, 31250]
+    >>> [share(n, 2) for n in (50_000, 100_000, 1_000_000)]
+    [25000, 25000, 25000]
     """
     count = n // LEAST
     return n // max(count - count % threads, 1)
