@@ -31,10 +31,17 @@ from postproc.language.analysis.interpreter import (
     calls_around,
 )
 from postproc.language.analysis.move_runs import Runs, find_runs, rows_of_lines
+from postproc.language.analysis.origins import (
+    MANY,
+    NOWHERE,
+    TOLD_TOGETHER,
+    Origins,
+    join_origins,
+)
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.language import Start
 from postproc.language.text.statement_table import StatementText
-from postproc.language.visits import ELSEWHERE, Diagnostic
+from postproc.language.visits import Diagnostic
 
 DEEPEST = 60  # calls within calls
 
@@ -66,14 +73,16 @@ class Arrived:
     """How the arm may come to a statement.
 
     Attributes:
-        origins: Visits, START or ELSEWHERE.
+        origins: Where it may come from.
         modes: What moves are carried out with.
         points: What points hold that assignments have changed, as far as it is known.
+        lost: See `TaskMachine`; shared by all ways.
     """
 
-    origins: frozenset[int]
+    origins: Origins
     modes: Any
     points: Points = NO_POINTS
+    lost: set[int] = field(default_factory=set, compare=False)
 
     def copy(self) -> Arrived:
         """Return it: it never changes."""
@@ -87,16 +96,22 @@ class Arrived:
         if modes != other.modes:
             modes = modes.join(other.modes)
         points = self.points.join(other.points)
-        both = Arrived(self.origins | other.origins, modes, points)
+        origins = join_origins(self.origins, other.origins, self.lost)
+        both = Arrived(origins, modes, points, self.lost)
         return self if both == self else both
 
     def forget(self) -> Arrived:
         """Forget where the arm is, what moves are made with, and all shared data."""
-        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
+        modes, points = self.modes.forget(), self.points.forget_shared()
+        return Arrived(NOWHERE, modes, points, self.lost)
 
     def elsewhere(self) -> Arrived:
         """Forget where the arm is."""
-        return Arrived(NOWHERE, self.modes, self.points)
+        return self.arriving(NOWHERE)
+
+    def arriving(self, origins: Origins) -> Arrived:
+        """Return it where the arm comes from elsewhere."""
+        return Arrived(origins, self.modes, self.points, self.lost)
 
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
@@ -104,8 +119,9 @@ class Arrived:
 
     def with_modes(self, modes: Any) -> Arrived:
         """Return it where moves are made otherwise."""
-        same = modes is self.modes
-        return self if same else Arrived(self.origins, modes, self.points)
+        if modes is self.modes:
+            return self
+        return Arrived(self.origins, modes, self.points, self.lost)
 
     def setting(self, **changed: Any) -> Arrived:
         """Return it where some modes have other values."""
@@ -116,7 +132,6 @@ class Arrived:
         return self.setting(blocked=self.modes.blocked | {why})
 
 
-NOWHERE = frozenset([ELSEWHERE])
 JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
 """Words with which a statement leads to another place."""
 MOVES = "moves"
@@ -595,8 +610,11 @@ class TaskMachine(Interpreter[Arrived]):
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
-        self.visits[known[0]].origins |= here.origins
-        return Arrived(frozenset([known[-1]]), here.modes, here.points)
+        first = self.visits[known[0]]
+        first.origins = join_origins(first.origins, here.origins, self.lost)
+        if MANY in first.origins:
+            self.say(scope_at(at), Code.MANY_ORIGINS, TOLD_TOGETHER)
+        return here.arriving(frozenset([known[-1]]))
 
     def _take_again(
         self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]
@@ -614,9 +632,9 @@ class TaskMachine(Interpreter[Arrived]):
             return here
         return here.with_points(self.task.assign(here.points, one, scope_at(at)))
 
-    def begin(self, origins: frozenset[int], modes: Any) -> Arrived:
+    def begin(self, origins: Origins, modes: Any) -> Arrived:
         """Return how the arm comes to where the task begins: no point is assigned."""
-        return Arrived(origins, modes, Points(alike=self.task.are_alike))
+        return Arrived(origins, modes, Points(alike=self.task.are_alike), self.lost)
 
     def settle_points(self) -> None:
         """Forget what moves take of data that hold other values on other ways."""
@@ -646,6 +664,11 @@ class TaskMachine(Interpreter[Arrived]):
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""
         self.paused |= here.origins
+
+    def list_visits(self, origins: Origins) -> set[int]:
+        """Return visits; of those that are not told apart all that there may be."""
+        every = origins | self.lost if MANY in origins else origins
+        return {k for k in every if k >= 0}
 
     def find_unsure_stops(self) -> set[int]:
         """Return the visits at which it is not known whether the arm stops."""

@@ -33,6 +33,7 @@ from postproc.language.analysis.found_visits import (
     whole_name,
 )
 from postproc.language.analysis.move_runs import within
+from postproc.language.analysis.origins import number_origins
 from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
@@ -258,11 +259,10 @@ class TaskCollector(ABC):
 
     def _graph(self) -> visits.Graph:
         """Translate origins to visits in program order: they end a run."""
-        ends = (self.begin + self.counts - 1).tolist()
-        last = dict(zip(self.order, ends, strict=True))
-        origins = [
-            sorted(last[p] if p >= 0 else p for p in v.origins) for v in self.found
-        ]
+        ends = self.begin + self.counts - 1
+        last = np.empty(len(ends), np.int64)
+        last[self.order] = ends
+        origins = [number_origins(v.origins, last) for v in self.found]
         return chain_visits(self.counts, origins)
 
     def _pin(

@@ -452,11 +452,11 @@ class KrlMachine(TaskMachine):
         """
         found: dict[int, frozenset[Reason]] = {}
         for why, origins in self._before.items():
-            reached = set(origins)
+            reached = self.list_visits(frozenset(origins))
             for _ in range(FURTHEST_AHEAD):
-                behind = [self.visits[k] for k in reached if k >= 0]
+                behind = [self.visits[k] for k in reached]
                 before = [v.origins for v in behind if not v.modes.halted]
-                reached = reached.union(*before)
+                reached |= self.list_visits(frozenset().union(*before))
             for k in reached:
                 found[k] = found.get(k, frozenset()) | {why}
         return found

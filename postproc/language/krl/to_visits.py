@@ -211,7 +211,7 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     """
     partial = (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
     for v in (v for v in found if v.goal.target in partial):
-        before = [found[k] for k in v.origins if k >= 0]
+        before = [found[k] for k in machine.list_visits(v.origins)]
         lost = any(one.move.angle is not None for one in before)
         if v.goal.target == Meaning.PARTIAL_POSE:
             own = _frames(machine, v)

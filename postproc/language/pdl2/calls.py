@@ -8,6 +8,7 @@ from dataclasses import replace
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At
+from postproc.language.analysis.origins import NOWHERE
 from postproc.language.language import Record
 from postproc.language.pdl2 import external_routines, side_effects
 from postproc.language.pdl2 import syntax as ast
@@ -41,7 +42,6 @@ from postproc.language.pdl2.values import (
     Value,
     points_of,
 )
-from postproc.language.visits import ELSEWHERE
 
 # Routines that cannot be followed: their moves are listed, what they change forgotten.
 #
@@ -99,7 +99,7 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
     for row in range(body.first + 1, body.last):
         statement = program.lines.statement(row)
         if isinstance(statement, ast.Move):
-            store = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+            store = Store(lambda key: nothing, last=NOWHERE)
             store.forget_frames(why)
             at = Execution(
                 here.world, place, row, store, here.volatile, context, reason

@@ -19,6 +19,7 @@ from postproc.arrays import (
 )
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.call_context import Point
+from postproc.language.analysis.origins import NOWHERE, number_origins
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
     Numbering,
@@ -28,7 +29,6 @@ from postproc.language.analysis.visit_columns import (
     to_visits,
 )
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import MANY
 from postproc.language.pdl2.conditions import SettingTable
 from postproc.language.pdl2.job import World, base_variable
 from postproc.language.pdl2.machine import (
@@ -45,7 +45,6 @@ from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import number_in_order
 from postproc.language.visits import (
-    ELSEWHERE,
     Graph,
     Literals,
     Meaning,
@@ -228,10 +227,9 @@ class Collector:
         """Translate predecessor ids to visits, in CSR form."""
         origins = []
         for run in self.runs:  # the visits that its first move may come from
-            found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
-            if MANY in run.predecessors or id(run.place.body) in self.machine.recursive:
-                found.add(ELSEWHERE)
-            origins.append(sorted(found))
+            again = id(run.place.body) in self.machine.recursive
+            found = run.predecessors | (NOWHERE if again else frozenset())
+            origins.append(number_origins(found, visit))
         return chain_visits(np.diff(self.offsets), origins)
 
     def _fill(self) -> None:
