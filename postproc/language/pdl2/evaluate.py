@@ -21,12 +21,11 @@ from postproc.language.pdl2.values import (
     Value,
     Vector,
     add_unknown,
-    binary,
     function,
     invert_frame,
+    operate,
     part_of,
     shift_position,
-    unary,
 )
 
 _DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
@@ -161,13 +160,11 @@ class ProgramPoint:
                 return self.read(expression)
             case ir.Operation("()", (operand,)):
                 return self.value(operand)
-            case ir.Operation(sign, (operand,)):
-                return unary(sign, self.value(operand))
-            case ir.Operation(sign, (left, right)):
-                values = self.value(left), self.value(right)
+            case ir.Operation(sign, operands):
+                values = [*map(self.value, operands)]
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
-                return binary(sign, *values)
+                return operate(sign, *values)
             case ir.Composite(items) if len(items) < 6:
                 return Nothing("it has fewer than six joint values")
             case ir.Composite(items):
