@@ -126,6 +126,9 @@ class KrlSplitter(TaskSplitter):
         return KrlLayout(source, start, code, indent, ";", word, first, settings)
 
 
+SPLITTER = KrlSplitter
+
+
 @dataclass(frozen=True)
 class KrlLayout(insert_moves.MoveLayout):
     """How a move is laid out, see `MoveLayout`.

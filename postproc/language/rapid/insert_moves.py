@@ -97,6 +97,9 @@ class RapidSplitter(TaskSplitter):
         )
 
 
+SPLITTER = RapidSplitter
+
+
 @dataclass(frozen=True)
 class RapidLayout(MoveLayout):
     """How a move is laid out, see `MoveLayout`.
