@@ -14,6 +14,7 @@ from postproc.language.pdl2.values import (
     FARTHEST,
     RUN_TIME,
     Alias,
+    Component,
     Location,
     Nothing,
     Position,
@@ -127,22 +128,20 @@ class ProgramPoint:
             keys = frozenset(f"{key}[{text}]" for key in keys)
         return Location(keys, exact and len(keys) == 1)
 
-    def _component(
-        self, steps: tuple[str | ir.ElementStep, ...]
-    ) -> tuple[str, int] | None:
+    def _component(self, steps: tuple[str | ir.ElementStep, ...]) -> Component:
         match steps:
-            case (str(name),) if name in COMPONENTS:
-                return (name, 0)
+            case (str(name),) | ("pos", str(name)) if name in COMPONENTS:
+                return COMPONENTS[name]
             case ("pos",):
-                return ("pos", 0)
-            case ("pos", str(name)) if name in COMPONENTS:
-                return (name, 0)
+                return "pos"
             case ("aux", ir.ElementStep((index,))):
                 axis = self.integer(index)
                 return None if axis is None else ("aux", axis)
             case (ir.ElementStep((index,)),):
                 axis = self.integer(index)
-                return None if axis is None else ("joint", axis)
+                if axis is None or 1 <= axis <= 6:
+                    return None if axis is None else axis - 1
+                return "aux", axis - 6
         return None
 
     # ---- reading --------------------------------------------------------------------
@@ -203,9 +202,9 @@ class ProgramPoint:
         held = self.store.read(target.key)
         if target.component == ():
             return held
-        at = component_index(target)
-        if at >= 0:
-            self.world.pin(held, "the program computes with a part of it", (at,))
+        if target.number >= 0:
+            why = "the program computes with a part of it"
+            self.world.pin(held, why, (target.number,))
         return part_of(held, target.component)
 
     def _unsteady(self, target: Location) -> bool:
@@ -283,7 +282,7 @@ class ProgramPoint:
         if reference.name.startswith("$"):
             return None
         target = self.locate(reference)
-        at = component_index(target)
+        at = target.number
         if at < 0 or not target.exact or self._unsteady(target):
             return None
         held = self.store.read(target.key)
@@ -334,16 +333,6 @@ class ProgramPoint:
         elif len(arguments) != 6:
             return Nothing("POS has not six numbers")
         return replace(self._components(arguments[:6]), config=config)
-
-
-def component_index(target: Location) -> int:
-    """Return which of the six numbers a reference means, -1 for anything else."""
-    match target.component:
-        case ("joint", axis) if 1 <= axis <= 6:
-            return axis - 1
-        case (str(name), _) if name in COMPONENTS:
-            return COMPONENTS[name]
-    return -1
 
 
 # Whole records, arrays and nodes: what they hold is copied part by part.

@@ -264,20 +264,25 @@ _LOGICAL = ("AND", "OR", "NOT")
 _NO_RESULT = Nothing("the arithmetic has no result")
 
 
-def part_of(held: Value, component: tuple[str, int] | tuple[()] | None) -> Value:
+Component = int | str | tuple[str, int] | tuple[()] | None
+"""Which part of a position: of its six numbers, ``pos``, or (``aux``, i) of an axis.
+
+() is the whole value, None a part that only the run tells.
+"""
+
+
+def part_of(held: Value, component: Component) -> Value:
     """Return a component of a position or vector."""
     if not isinstance(held, Position | Vector):
         return held if isinstance(held, Nothing) else RUN_TIME
     number: float | None = None
     match component:
-        case ("pos", _) if isinstance(held, Position):
+        case "pos" if isinstance(held, Position):
             return replace(held, aux=())
         case ("aux", axis) if isinstance(held, Position) and held.aux is not None:
             number = dict(held.aux).get(axis)
-        case ("joint", axis) if 1 <= axis <= len(held.numbers):
-            number = held.numbers[axis - 1]
-        case (str(name), _) if COMPONENTS.get(name, 9) < len(held.numbers):
-            number = held.numbers[COMPONENTS[name]]
+        case int(at) if at < len(held.numbers):
+            number = held.numbers[at]
     return RUN_TIME if number is None else number
 
 
@@ -321,15 +326,19 @@ class Location:
     Attributes:
         keys: Keys it may mean.
         exact: It means the one key, not some element of it.
-        component: Component of a position: x .. r, pos, ``aux`` and joint indices as
-            (``aux``, i) and (``joint``, i); () for the whole value, None if unknown.
+        component: The part of the value there that is meant.
     """
 
     keys: frozenset[str]
     exact: bool
-    component: tuple[str, int] | tuple[()] | None = ()
+    component: Component = ()
 
     @property
     def key(self) -> str:
         """Return the one key."""
         return next(iter(self.keys))
+
+    @property
+    def number(self) -> int:
+        """Which of the six numbers of a position is meant, -1 for anything else."""
+        return self.component if isinstance(self.component, int) else -1
