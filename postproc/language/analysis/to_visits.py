@@ -185,8 +185,8 @@ class TaskCollector(ABC):
         for number, text in enumerate(self.machine.texts):
             mine = c.file == number
             c.line[mine] = text.begin_line[row[mine]]
-        c.motion[:] = self._spread((v.motion for v in found), np.int64)
-        c.target[:] = self._spread((v.goal.target for v in found), np.int64)
+        c.kind[:] = self._spread((v.motion for v in found), np.int64)
+        c.meaning[:] = self._spread((v.goal.target for v in found), np.int64)
         c.via[:] = self._spread((v.via for v in found), bool)
         c.arc_angle = self._spread((v.arc_angle for v in found), float)
         c.block = np.append(self.begin, -1)[_blocks(found)].astype(np.int32)[owner]

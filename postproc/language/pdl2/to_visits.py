@@ -256,7 +256,7 @@ class Collector:
         c, visit, lines = self.columns, moves.visit, moves.program.lines
         c.file[visit] = self.machine.world.files.index(lines.source.name)
         c.line[visit] = lines.begin_line[moves.row]
-        c.motion[visit] = moves.of_forms(lambda form: form.motion)
+        c.kind[visit] = moves.of_forms(lambda form: form.motion)
         c.fly[visit] = moves.of_forms(lambda form: form.fly)
         c.via[visit] = moves.of_forms(lambda form: form.via)
 
@@ -306,7 +306,7 @@ class Collector:
                 numbers = first[:, None] + np.array(form.slots, dtype=np.int32)
                 c.values[mine[k]] = lines.value[numbers]
                 c.slots[mine[k]] = numbers + base
-            c.target[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
+            c.meaning[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
             if form.config is not None:
                 c.config[mine] = self.columns.configs[form.config]
                 c.config_given[mine] = True
@@ -315,7 +315,7 @@ class Collector:
         for k in chunks(len(mine)):
             wrong[k] = ~np.isfinite(c.values[mine[k]]).all(axis=1)
         bad = mine[wrong]
-        c.target[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
+        c.meaning[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
         if len(bad):
             moves.first[np.flatnonzero(here)[wrong]] = self.columns.reasons[_UNREAD]
         taught = self.machine.world.taught_lines[lines.source.name]
@@ -361,7 +361,7 @@ class Collector:
             c.config[visit[mine]] = self.columns.configs[layout.config or ""]
             c.config_given[visit[mine]] = layout.config is not None
             joints = layout.kind == "JNTP"
-            c.target[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
+            c.meaning[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
             for column, axis in enumerate(layout.axes):
                 if 1 <= axis <= c.aux.shape[1]:
                     c.aux[visit[mine], axis - 1] = entries.aux[rows[mine], column]
@@ -374,7 +374,7 @@ class Collector:
         index = np.array([k for k, _, _ in found])
         visit = moves.visit[index]
         goals = [goal for _, _, goal in found]
-        c.target[visit] = [goal.target for goal in goals]
+        c.meaning[visit] = [goal.target for goal in goals]
         c.values[visit] = np.array([goal.numbers for goal in goals], dtype=float)
         distances = np.array([goal.distance for goal in goals], dtype=float)
         if np.isfinite(distances).any():
@@ -424,7 +424,7 @@ class Collector:
         kinds += [
             moves.form,
             self._setting[moves.visit],
-            c.target[moves.visit],
+            c.meaning[moves.visit],
             moves.last,
         ]
         which, example = _alike(kinds)
