@@ -397,7 +397,7 @@ def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> Mapping[st
 def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
     """Yield where moves go that run in ways that are not followed, and say so."""
     files = machine.task.files  # and no others: of those beside the task nothing moves
-    for file, row in sorted({*machine.rows_beside()}):
+    for file, row in sorted({*machine.rows_of(machine.beside)}):
         if file >= len(files) or not files[file].is_move(row):
             continue
         text = machine.texts[file]

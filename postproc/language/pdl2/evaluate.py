@@ -85,12 +85,6 @@ class ProgramPoint:
         lines = self.place.program.lines
         return float(lines.value[lines.first[self.row] + slot])
 
-    def global_slot(self, slot: int) -> int:
-        """Return the job-wide index of a number of this line."""
-        lines = self.place.program.lines
-        base = self.world.slot_base[lines.source.name]
-        return int(base + lines.first[self.row] + slot)
-
     def integer(self, expression: ir.Operand) -> int | None:
         """Return a whole number, None where it is not known."""
         value = self.value(expression)
@@ -261,7 +255,10 @@ class ProgramPoint:
         """Return a number, and where in the text it is written or comes from."""
         match expression:
             case ir.Num(slot):
-                return SourceNumber(self.real(expression), self.global_slot(slot))
+                lines = self.place.program.lines
+                base = self.world.slot_base[lines.source.name]
+                at = int(base + lines.first[self.row] + slot)
+                return SourceNumber(self.real(expression), at)
             case ir.Operation("()", (operand,)):
                 return self.read_number(operand)
             case ir.DataObject():
@@ -385,7 +382,8 @@ def parts_of(here: ProgramPoint, origin: ir.DataObject) -> dict[str, Value]:
     for key in sorted(here.locate(origin).keys):
         for part in parts_under(here, key):
             value = here.store.read(part)
-            if not isinstance(value, Nothing) or value.of or is_standard(part):
+            standard = part.rpartition(".")[2].startswith("$")  # a node's: $main_pos
+            if not isinstance(value, Nothing) or value.of or standard:
                 found[part[len(key) :]] = value
     return found
 
@@ -394,11 +392,6 @@ def parts_under(here: ProgramPoint, key: str) -> list[str]:
     """Return the keys of elements and fields that a key has or ever had."""
     world = here.world
     return world.first_parts(key) + world.later_parts(key) + here.store.parts(key)
-
-
-def is_standard(key: str) -> bool:
-    """Tell whether a key is that of a standard field of a node: ``n.$main_pos``."""
-    return key.rpartition(".")[2].startswith("$")
 
 
 def invalidate_key(here: ProgramPoint, key: str, why: str) -> None:

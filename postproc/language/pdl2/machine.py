@@ -155,8 +155,6 @@ class Machine(Interpreter[Store]):
         interrupted: A condition handler may move the arm at any time.
         handler: Why no move can be compensated that a handler may interrupt.
         cycle_left: A condition handler may begin the cycle again at any time.
-        paused: Visits behind which the arm may stop before the program goes on.
-        lost: Visits behind which it may go anywhere.
         given: What variables are given at any time.
     """
 
@@ -168,18 +166,9 @@ class Machine(Interpreter[Store]):
     interrupted: bool = False
     handler: Reason = NO_REASON
     cycle_left: bool = False
-    paused: set[int] = field(default_factory=set)
-    lost: set[int] = field(default_factory=set)
     given: GivenValues = field(default_factory=GivenValues)
     _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
     next_id: int = 0
-
-    def visit_id(self, key: Key, count: int = 1) -> int:
-        """Return the first id of the visits of a place."""
-        if key not in self.ids:
-            self.ids[key] = self.next_id
-            self.next_id += count
-        return self.ids[key]
 
     def record(self, here: Execution, sub: int, arrival: MoveRun) -> int:
         """Keep visits; return the id of the first."""
@@ -187,7 +176,10 @@ class Machine(Interpreter[Store]):
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:
             here.report_once(Code.MANY_ORIGINS, str(here.row), TOLD_TOGETHER)
-        return self.visit_id(key, len(arrival))
+        if key not in self.ids:
+            self.ids[key] = self.next_id
+            self.next_id += len(arrival)
+        return self.ids[key]
 
     def predecessors(self, here: Execution) -> Origins:
         """Return where the arm may come from."""
