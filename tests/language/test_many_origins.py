@@ -113,3 +113,14 @@ def test_a_cycle_of_them_settles(
     every = [START, *range(count)]
     wanted = every if len(every) <= MOST_ORIGINS else [ELSEWHERE]
     assert all(visits.graph.predecessors(n).tolist() == wanted for n in range(count))
+
+
+def test_an_interrupt_may_come_in_any_move_that_is_not_told_apart(bench_cell) -> None:
+    """The program is ahead of the arm where it switches the interrupt on."""
+    moves = (f"IF n==1 THEN\n{FLY['src'].format(n)}ENDIF\n" for n in range(600))
+    on = "INTERRUPT DECL 3 WHEN $IN[3]==TRUE DO other( )\nINTERRUPT ON 3\n"
+    job = JOB["src"].format("".join(moves) + on + STOP["src"].format(7))
+    job += "DEF other( )\nPTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\nEND\n"
+    visits = read_program({"job.src": job.encode()}, bench_cell).visits
+    codes = {visits.reasons[k].code for k in visits.reason[:601].tolist()}
+    assert codes == {"beside-program"}
