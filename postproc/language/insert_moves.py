@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import filterfalse, islice
+from typing import Any, ClassVar
 
 from postproc.arrays import Floats
 from postproc.language.ir import SourceStatement
@@ -18,6 +19,7 @@ from postproc.language.text.source import (
     Span,
     check_length,
 )
+from postproc.language.text.statement_table import Statements
 
 PASSED_MM = 0.3  # size of the zone of inserted points, where they have one of their own
 
@@ -93,28 +95,32 @@ class Splitter(ABC):
         unsized: Why points stay out whose blending is not known, "" where the arm
             passes them however they are blended.
         keeps_aux: External axes stay where they are on the way to points.
+        kind: Of the statements that are moves.
     """
 
     unsized: str = ""
     keeps_aux: bool = False
+    kind: ClassVar[type[SourceStatement]]
 
     # What a language says. A move is named by its file and its line there.
 
     @abstractmethod
-    def list_problems(self, file: int, line: int) -> Iterable[tuple[str, object]]:
-        """Yield what may forbid points on the way of a move, and whether it does."""
+    def find(self, file: int, line: int) -> tuple[Statements[Any], int]:
+        """Return the statements of a file, and the row of a move."""
 
     @abstractmethod
-    def statements_before(self, file: int, line: int) -> Iterator[SourceStatement]:
-        """Yield the statements in front of a move, the nearest one first."""
+    def list_problems(
+        self, file: int, row: int, move: Any
+    ) -> Iterable[tuple[str, object]]:
+        """Yield what may forbid points on the way of a move, and whether it does."""
 
     @abstractmethod
     def is_setting(self, one: SourceStatement) -> bool:
         """Return True if a statement sets how moves are made, and does no more."""
 
-    @abstractmethod
     def is_plain_move(self, one: SourceStatement) -> bool:
         """Return True if a statement moves, and begins no process."""
+        return isinstance(one, self.kind)
 
     @abstractmethod
     def layout(self, file: int, line: int) -> MoveLayout:
@@ -133,8 +139,12 @@ class Splitter(ABC):
             file: Where the move stands.
             line: Its line there.
         """
-        found = (text for text, hinders in self.list_problems(file, line) if hinders)
-        return next(found, "")
+        text, row = self.find(file, line)
+        move = text.statement(row)
+        if not isinstance(move, self.kind) or text.line(row) != line:
+            return "it does not stand alone on its line"
+        problems = self.list_problems(file, row, move)
+        return next((problem for problem, hinders in problems if hinders), "")
 
     def stops(self, file: int, line: int) -> bool:
         """Tell whether the arm may stop once more before a move.
@@ -145,7 +155,9 @@ class Splitter(ABC):
             file: Where the move stands.
             line: Its line there.
         """
-        others = filterfalse(self.is_setting, self.statements_before(file, line))
+        text, row = self.find(file, line)
+        before = map(text.statement, range(row - 1, -1, -1))
+        others = filterfalse(self.is_setting, before)
         return any(map(self.is_plain_move, islice(others, 1)))
 
     def points(

@@ -153,11 +153,6 @@ class NotUnderstood(SourceStatement):
     text: str = ""
 
 
-def is_odd(one: SourceStatement) -> bool:
-    """Return True if a statement is not understood."""
-    return isinstance(one, NotUnderstood)
-
-
 @dataclass(frozen=True, slots=True)
 class BlockWord(SourceStatement):
     """A word that is a statement: else, endif, .., and what follows it on its line."""

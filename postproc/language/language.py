@@ -8,13 +8,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
 from postproc.arrays import Floats, Ints
 from postproc.files import FolderListing
 from postproc.language.insert_moves import Splitter
-from postproc.language.measuring_program import MeasuringProgram
+from postproc.language.measuring_program import MeasuringProgram, refuse_other_name
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import (
     AT_APPROACH,
@@ -235,6 +236,7 @@ class Language(ABC):
         dialect: What the numbers of its targets mean.
         tells_accuracy: Programs or controllers show whether the controller compensates
             on its own; else the cell must say so itself.
+        named_as_file: Controllers take a program only under the name of its file.
         names_numbers: Positions stand in braces, with a name before every number.
         via_first: The point on the way of an arc stands before its end.
         names: What lines begin with that name a point, tried in order.
@@ -247,6 +249,7 @@ class Language(ABC):
     comment: str
     dialect: Dialect
     tells_accuracy: bool = True
+    named_as_file: bool = False
     names_numbers: bool = False
     via_first: bool = True
     names: ClassVar[Sequence[re.Pattern[str]]]
@@ -345,7 +348,11 @@ class Language(ABC):
         """Return the arms of an archive, and their poses (4, 4) [m] in the world."""
         return ()
 
-    @abstractmethod
+    def load_part(self, name: str) -> Any:
+        """Load a module of the language that few programs need."""
+        package = type(self).__module__.rpartition(".")[0]
+        return import_module(f"{package}.{name}")
+
     def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
         """Write a measuring program as a controller takes it.
 
@@ -356,6 +363,9 @@ class Language(ABC):
         Raises:
             ProgramError: It cannot be called as its file.
         """
+        if self.named_as_file:
+            refuse_other_name(program, file.name, file.stem)
+        return str(self.load_part("measuring_program").write(program))
 
     def prepare(self) -> None:  # noqa: B027 - most have nothing to load
         """Load what reading the first program takes."""

@@ -361,3 +361,14 @@ def test_a_routine_that_nothing_calls_counts_where_others_may_call_it(
     monkeypatch.setitem(ROUTINES, language, ROUTINES[language] + text)
     found = visits(bench_cell, language, "go p1", "go p2")
     assert bool(found.literals.pinned[found.target.literal[1]]) != alone
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_numbers_that_only_rounding_tells_apart_decide_no_way(
+    language: str, bench_cell: Cell
+) -> None:
+    """Controllers compute with fewer digits: to them 0.1 * 3 may be less than 0.3."""
+    ways = ("if 0.1*3<0.3", "go p1", "else", "go p2", "end")
+    assert len(visits(bench_cell, language, *ways)) == 2
+    ways = ("if 0.1*3<0.31", "go p1", "else", "go p2", "end")
+    assert len(visits(bench_cell, language, *ways)) == 1

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from operator import attrgetter
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Indices, Interned, Ints, is_one_value, slim
+from postproc.arrays import Indices, Interned, is_one_value, slim
 from postproc.language import visits
 from postproc.language.shifts import Pose, flat
 from postproc.robot.pose import pose_from_record
 
+_DTYPES: Mapping[Any, Any] = {"Floats": float, "Bools": bool, "Ints": np.int8}
+P = TypeVar("P", bound=visits.VisitPart)
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 
 
@@ -46,13 +49,13 @@ class Conditions:
     Attributes:
         tool, base, uframe: Frames.
         taught: Which of them were taught with the arm, and contain its error.
-        remote: The tool stands still, and the arm holds the part.
+        tool_remote: The tool stands still, and the arm holds the part.
         care: Whether branch and turn are checked, and turns may be far.
         nearest_turn: Joints go to the nearest turn, whatever the flags say.
-        law: How the tool turns on the way.
-        wrist: On a line the wrist turns joint by joint.
+        orientation_law: How the tool turns on the way.
+        wrist_joint: On a line the wrist turns joint by joint.
         zone: How it is passed.
-        speed: Along the path [m/s], NaN where not known.
+        linear: Speed along the path [m/s], NaN where not known.
         turning: Speed of turning [rad/s], likewise.
         override: Share of the programmed speed.
         load: What the program states that the arm carries: mass [kg] and its centre in
@@ -64,90 +67,66 @@ class Conditions:
     base: Pose = ()
     uframe: Pose = ()
     taught: tuple[bool, bool, bool] = (False, False, False)
-    remote: bool = False
+    tool_remote: bool = False
     care: tuple[visits.Switch, visits.Switch, visits.Switch] = (
         visits.Switch.UNSET,
     ) * 3
     nearest_turn: bool = False
-    law: visits.OrientationLaw = visits.OrientationLaw.UNSET
-    wrist: bool = False
+    orientation_law: visits.OrientationLaw = visits.OrientationLaw.UNSET
+    wrist_joint: bool = False
     zone: Zone = Zone()
-    speed: float = math.nan
+    linear: float = math.nan
     turning: float = math.nan
     override: float = 1.0
     load: tuple[float, ...] = NO_LOAD
     weaves: bool = False
 
 
-@dataclass(frozen=True)
-class VisitMotion:
-    """What a visit itself says of the motion: see `MotionColumns`, (n,) each."""
-
-    kind: Indices
-    via: Bools
-    fly: Bools
-    arc_angle: Floats
-    block: Ints
-    curved: Bools
-
-
 class ConditionColumns:
-    """Writes the columns that say what n visits are carried out with."""
+    """Writes the columns that say what n visits are carried out with.
+
+    Those of a name that conditions have are what these say.
+    """
 
     def __init__(self, table: Interned[Conditions], rows: Indices) -> None:
         """Take the distinct conditions, and those of each visit, (n,)."""
         self._held, self._rows = [*table], rows
         self._used = np.flatnonzero(np.bincount(rows, minlength=len(self._held)))
 
+    def part(self, part: type[P], inside: str = "", /, **other: Any) -> P:
+        """Return a part of visits.
+
+        Args:
+            part: The part.
+            inside: What of conditions holds its columns, with a dot.
+            other: Columns and tables that conditions do not say.
+        """
+        own = {f.name: _DTYPES[f.type] for f in fields(part) if f.name not in other}
+        for name, dtype in own.items():
+            said = map(attrgetter(inside + name), self._held)
+            other[name] = self._spread(np.array([*said], dtype))
+        return part(**other)
+
     def frame(self) -> visits.FrameColumns:
         """Return the frames, each of them once."""
         poses = Interned[tuple[Pose, bool]]()
         index = np.array([_number(poses, c) for c in self._held], np.int32)
-        tool, base, uframe = index.reshape(-1, 3).T
-        return visits.FrameColumns(
-            tool=self._spread(tool),
-            base=self._spread(base),
-            uframe=self._spread(uframe),
+        columns = zip(("tool", "base", "uframe"), index.reshape(-1, 3).T, strict=True)
+        return self.part(
+            visits.FrameColumns,
+            "",
+            **{name: self._spread(column) for name, column in columns},
             poses=np.array([pose for pose, _ in poses], float).reshape(-1, 4, 4),
             taught=np.array([taught for _, taught in poses], bool),
-            tool_remote=self._each(lambda c: c.remote, bool),
         )
 
-    def motion(self, own: VisitMotion) -> visits.MotionColumns:
-        """Return how the arm moves."""
+    def motion(self, **own: Any) -> visits.MotionColumns:
+        """Return how the arm moves, with the columns that visits say themselves."""
         loads = Interned[tuple[float, ...]]([NO_LOAD])
+        index = np.array([loads[c.load] for c in self._held], np.int32)
         care = np.array([c.care for c in self._held], np.int8).reshape(-1, 3)
-        return visits.MotionColumns(
-            **{name: slim(column) for name, column in vars(own).items()},
-            nearest_turn=self._each(lambda c: c.nearest_turn, bool),
-            care=self._spread(care),
-            wrist_joint=self._each(lambda c: c.wrist, bool),
-            orientation_law=self._each(lambda c: c.law, np.int8),
-            weaves=self._each(lambda c: c.weaves, bool),
-            load=self._each(lambda c: loads[c.load], np.int32),
-            loads=np.array([*loads], float),
-        )
-
-    def zone(self) -> visits.ZoneColumns:
-        """Return how targets are passed."""
-        return visits.ZoneColumns(
-            size_mm=self._each(lambda c: c.zone.size_mm, float),
-            overlap_percent=self._each(lambda c: c.zone.overlap_percent, float),
-            blend=self._each(lambda c: c.zone.blend, np.int8),
-            rule=self._each(lambda c: c.zone.rule, np.int8),
-        )
-
-    def speed(self) -> visits.SpeedColumns:
-        """Return how fast the arm moves."""
-        return visits.SpeedColumns(
-            linear=self._each(lambda c: c.speed, float),
-            turning=self._each(lambda c: c.turning, float),
-            override=self._each(lambda c: c.override, float),
-        )
-
-    def _each(self, said: Callable[[Conditions], Any], dtype: DTypeLike) -> Any:
-        """Return what is said of the conditions of every visit, (n,)."""
-        return self._spread(np.array([said(c) for c in self._held], dtype))
+        own |= {"load": self._spread(index), "care": self._spread(care)}
+        return self.part(visits.MotionColumns, loads=np.array([*loads], float), **own)
 
     def _spread(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return a column of conditions; those that are used often say one value."""

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.assigned_points import AssignedPoint, Scope
+from postproc.language.analysis.origins import Origins
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -235,7 +236,7 @@ class FoundVisit:
     via: bool
     goal: FoundGoal
     modes: Any
-    origins: frozenset[int] = frozenset()
+    origins: Origins = frozenset()
     why: Reason = NO_REASON
     arc_angle: float = math.nan
     block: Hashable = None
@@ -243,7 +244,7 @@ class FoundVisit:
     count: int = 1
     agreed: bool = True
     taken: frozenset[AssignedPoint] = frozenset()
-    left: tuple[Any, Any, frozenset[int]] | None = None
+    left: tuple[Any, Any, Origins] | None = None
 
     @property
     def row(self) -> int:

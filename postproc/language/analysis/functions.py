@@ -54,6 +54,10 @@ def apply_operator(sign: str, parts: Sequence[float]) -> float:
             return a * b
         case "/", [a, b] if b:
             return a / b
+        case "DIV", [a, b] if b and math.isfinite(a / b):
+            return float(math.trunc(a / b))
+        case "MOD", [a, b] if b and math.isfinite(a):
+            return math.fmod(a, b)
         case "NOT", [a]:
             return 1.0 - a
         case "INCR", [a]:

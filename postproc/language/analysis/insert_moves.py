@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.insert_moves import MoveLayout, Splitter
-from postproc.language.ir import SourceStatement
 from postproc.language.text.source import CloneError, Source
+from postproc.language.text.statement_table import StatementText
 
 
 @dataclass(frozen=True)
@@ -42,14 +41,13 @@ class TaskSplitter(Splitter):
             CloneError: It is not understood.
         """
 
-    def statements_before(self, file: int, line: int) -> Iterator[SourceStatement]:
-        """Yield what stands in front of a move, see `Splitter.statements_before`."""
-        own = self.task.files[file]
-        return map(own.text.statement, range(own.find_move(line) - 1, -1, -1))
+    def find(self, file: int, line: int) -> tuple[StatementText[Any], int]:
+        """Return the statements of a file, and the row of a move."""
+        return self.task.files[file].text, self.task.files[file].find_move(line)
 
     def layout(self, file: int, line: int) -> MoveLayout:
         """Look at a move, see `Splitter.layout`."""
-        text, row = self.task.files[file].text, self.task.files[file].find_move(line)
+        text, row = self.find(file, line)
         source, (begin, end) = text.source, text.span(row)
         start = int(source.line_starts[line - 1])
         if source.text[start:begin].strip():

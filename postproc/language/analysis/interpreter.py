@@ -97,6 +97,8 @@ class Interpreter(ABC, Generic[S]):
         unrolled: Rows of loops that are followed round by round, all rounds together.
         steps: Statements that have been run.
         exhausted: The program has too many ways to be followed to the end.
+        paused: Visits behind which the arm may stop before the program goes on.
+        lost: Visits behind which it may go anywhere.
     """
 
     root: Context = field(default_factory=Context)
@@ -106,6 +108,8 @@ class Interpreter(ABC, Generic[S]):
     unrolled: int = 0
     steps: int = 0
     exhausted: bool = False
+    paused: set[int] = field(default_factory=set)
+    lost: set[int] = field(default_factory=set)
     _heap: list[tuple[Point, int]] = field(default_factory=list)
     _queued: set[At] = field(default_factory=set)
 
@@ -383,7 +387,9 @@ class Interpreter(ABC, Generic[S]):
     def _afford(self, at: At, rounds: int) -> bool:
         """Tell whether there are so few rounds that each is followed by itself."""
         rows = rounds * (at.place.flow.behind(at.row) - at.row)
-        if rounds * self.rounds_around(at.context) > MOST_ROUNDS:
+        loops = (one.begun_at for one in at.context.around() if one.is_round)
+        around = math.prod(self.counted[loop].rounds for loop in loops)
+        if rounds * around > MOST_ROUNDS:
             return False
         if self.unrolled + rows > MOST_ROWS:
             return False
@@ -414,14 +420,6 @@ class Interpreter(ABC, Generic[S]):
             self.go_on(head.behind, state)
         state = self.forget_counter(at, loop, True, state)
         self.go_on(at.behind, state)
-
-    def rounds_around(self, context: Context) -> int:
-        """Return how often a context is run by the loops around it and its callers."""
-        times = 1
-        for one in context.around():
-            if one.is_round:
-                times *= self.counted[one.begun_at].rounds
-        return times
 
     # Calls.
 

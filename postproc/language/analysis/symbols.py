@@ -60,7 +60,7 @@ class TaskSymbols(ABC, Generic[F]):
         constants: Names that the language gives values to.
         functions: Kinds of routines that return values.
         by_name: Records hold their components by name, not by their order.
-        divides: ``a / b`` is known, whatever kind of numbers they are.
+        uncertain: Operators whose result kinds of numbers, or controllers, decide.
         apart: Data may be declared in one place and get their first value elsewhere.
         volatile: Names of data that may change at any time, by what runs beside.
     """
@@ -75,7 +75,7 @@ class TaskSymbols(ABC, Generic[F]):
     constants: ClassVar[Mapping[str, float]] = {}
     functions: ClassVar[str]
     by_name: ClassVar[bool] = False
-    divides: ClassVar[bool] = True
+    uncertain: ClassVar[Collection[str]] = ("DIV", "MOD")
     apart: ClassVar[bool] = False
     volatile: frozenset[str] = field(default=frozenset(), init=False)
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
@@ -162,7 +162,7 @@ class TaskSymbols(ABC, Generic[F]):
 
     def operate(self, operator: str, parts: Sequence[Value | None]) -> Value | None:
         """Compute what an operator gives, None where that is not known."""
-        if operator == "/" and not self.divides:
+        if operator in self.uncertain:
             return None
         return _make_number(
             apply_operator(operator, [number_in(part) for part in parts])

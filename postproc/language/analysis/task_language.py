@@ -14,6 +14,7 @@ from postproc.language.analysis.clones import TaskCloner
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.task_machine import TaskMachine, follow
 from postproc.language.analysis.to_visits import TaskCollector
+from postproc.language.insert_moves import Splitter
 from postproc.language.language import Cloner, JobReading, Language, Start
 from postproc.language.text.blocks import check_blocks, read_once
 from postproc.language.text.grammars import line_parser
@@ -132,6 +133,12 @@ class TaskLanguage(Language):
             tuple(sorted(found)), kept, missed,
             frozenset(file.text.source.name for file in quiet),
         )  # fmt: skip
+
+    def splitter(self, sources: Sequence[Source]) -> Splitter:
+        """Parse the files of a job to put points on the ways of its moves."""
+        task = self.parse(sources, Start())
+        found: Splitter = self.load_part("insert_moves").SPLITTER(task)
+        return found
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone points in them."""

@@ -31,10 +31,17 @@ from postproc.language.analysis.interpreter import (
     calls_around,
 )
 from postproc.language.analysis.move_runs import Runs, find_runs, rows_of_lines
+from postproc.language.analysis.origins import (
+    MANY,
+    NOWHERE,
+    TOLD_TOGETHER,
+    Origins,
+    join_origins,
+)
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.language import Start
 from postproc.language.text.statement_table import StatementText
-from postproc.language.visits import ELSEWHERE, Diagnostic
+from postproc.language.visits import Diagnostic
 
 DEEPEST = 60  # calls within calls
 
@@ -66,14 +73,16 @@ class Arrived:
     """How the arm may come to a statement.
 
     Attributes:
-        origins: Visits, START or ELSEWHERE.
+        origins: Where it may come from.
         modes: What moves are carried out with.
         points: What points hold that assignments have changed, as far as it is known.
+        lost: See `Interpreter`; shared by all ways.
     """
 
-    origins: frozenset[int]
+    origins: Origins
     modes: Any
     points: Points = NO_POINTS
+    lost: set[int] = field(default_factory=set, compare=False)
 
     def copy(self) -> Arrived:
         """Return it: it never changes."""
@@ -87,16 +96,22 @@ class Arrived:
         if modes != other.modes:
             modes = modes.join(other.modes)
         points = self.points.join(other.points)
-        both = Arrived(self.origins | other.origins, modes, points)
+        origins = join_origins(self.origins, other.origins, self.lost)
+        both = Arrived(origins, modes, points, self.lost)
         return self if both == self else both
 
     def forget(self) -> Arrived:
         """Forget where the arm is, what moves are made with, and all shared data."""
-        return Arrived(NOWHERE, self.modes.forget(), self.points.forget_shared())
+        modes, points = self.modes.forget(), self.points.forget_shared()
+        return Arrived(NOWHERE, modes, points, self.lost)
 
     def elsewhere(self) -> Arrived:
         """Forget where the arm is."""
-        return Arrived(NOWHERE, self.modes, self.points)
+        return self.arriving(NOWHERE)
+
+    def arriving(self, origins: Origins) -> Arrived:
+        """Return it where the arm comes from elsewhere."""
+        return Arrived(origins, self.modes, self.points, self.lost)
 
     def with_points(self, points: Points) -> Arrived:
         """Return it where points hold something else."""
@@ -104,8 +119,9 @@ class Arrived:
 
     def with_modes(self, modes: Any) -> Arrived:
         """Return it where moves are made otherwise."""
-        same = modes is self.modes
-        return self if same else Arrived(self.origins, modes, self.points)
+        if modes is self.modes:
+            return self
+        return Arrived(self.origins, modes, self.points, self.lost)
 
     def setting(self, **changed: Any) -> Arrived:
         """Return it where some modes have other values."""
@@ -116,7 +132,6 @@ class Arrived:
         return self.setting(blocked=self.modes.blocked | {why})
 
 
-NOWHERE = frozenset([ELSEWHERE])
 JUMPS = frozenset("goto return exit exitcycle raise retry trynext".split())
 """Words with which a statement leads to another place."""
 MOVES = "moves"
@@ -146,8 +161,6 @@ class TaskMachine(Interpreter[Arrived]):
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
         at_once: Moves that differ only in where they go are read at once.
-        paused: Visits behind which the arm may stop before the program goes on.
-        lost: Visits behind which it may go anywhere.
     """
 
     procedures: ClassVar[Collection[str]]
@@ -161,8 +174,6 @@ class TaskMachine(Interpreter[Arrived]):
     reached: list[Bools] = field(init=False)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
-    paused: set[int] = field(default_factory=set)
-    lost: set[int] = field(default_factory=set)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _runs_in: dict[Context, Runs] = field(default_factory=dict)
     _numbers: dict[At, list[int]] = field(default_factory=dict)
@@ -257,7 +268,7 @@ class TaskMachine(Interpreter[Arrived]):
     ) -> Arrived | None:
         """Go on behind a statement that only this language has."""
         after = self.unknown(at, here)
-        if ir.is_odd(one):
+        if isinstance(one, ir.NotUnderstood):
             self.may_jump(at, after)
         return after
 
@@ -274,20 +285,22 @@ class TaskMachine(Interpreter[Arrived]):
         """Tell whether the handlers of a routine begin with a statement."""
         return False
 
-    def scopes_of(self, routine: TaskRoutine) -> Iterable[Scope]:
-        """Yield where the statements of a routine stand, by all calls of it."""
-        return self._scopes_of(routine, frozenset())
-
-    def _scopes_of(
-        self, routine: TaskRoutine, seen: frozenset[tuple[int, int]]
+    def scopes_of(
+        self, routine: TaskRoutine, seen: frozenset[tuple[int, int]] = frozenset()
     ) -> Iterator[Scope]:
+        """Yield where the statements of a routine stand, by all calls of it.
+
+        Args:
+            routine: The routine.
+            seen: Keys of routines that are being looked at.
+        """
         yield self.task.scope_of(routine)
         head = routine.rows.head
         if not head.parameters or routine.key in seen:
             return
         seen = seen | {routine.key}
         for caller, row, call in self._calls_by_name[head.name]:
-            for there in self._scopes_of(caller, seen):
+            for there in self.scopes_of(caller, seen):
                 bound = self.task.bind(routine, call, there.at(row))
                 if bound is not None:
                     yield bound
@@ -415,22 +428,20 @@ class TaskMachine(Interpreter[Arrived]):
         self.return_to_caller(context, self.at_return(context, state))
 
     def _runs_of(self, context: Context) -> Runs:
-        """Return which moves are read at once in a call, or a round of a loop."""
+        """Return which moves are read at once in a call, or a round of a loop.
+
+        They are found in the statements of a routine once for all calls of it.
+        """
         if context not in self._runs_in:
             apart = self.apart(context) if self.at_once else None
-            own = {} if apart is None else self._find_runs(context.place, apart)
-            self._runs_in[context] = own
+            place = context.place
+            key = place.scope.file, place.flow.first
+            if apart is not None and key not in self._runs:
+                apart = apart | self._taught_rows[place.scope.file]
+                alike = self.places_of, self.is_plain
+                self._runs[key] = find_runs(place.text, place.flow, apart, *alike)
+            self._runs_in[context] = {} if apart is None else self._runs[key]
         return self._runs_in[context]
-
-    def _find_runs(self, place: TaskPlace, apart: set[int]) -> Runs:
-        """Find them in the statements of a routine, once for all calls of it."""
-        key = place.scope.file, place.flow.first
-        if key not in self._runs:
-            self._runs[key] = find_runs(
-                place.text, place.flow, apart | self._taught_rows[place.scope.file],
-                self.places_of, self.is_plain,
-            )  # fmt: skip
-        return self._runs[key]
 
     @cached_property
     def _taught_rows(self) -> Sequence[set[int]]:
@@ -595,8 +606,11 @@ class TaskMachine(Interpreter[Arrived]):
             if visit.modes != here.modes:
                 visit.modes = visit.modes.join(here.modes)
             visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
-        self.visits[known[0]].origins |= here.origins
-        return Arrived(frozenset([known[-1]]), here.modes, here.points)
+        first = self.visits[known[0]]
+        first.origins = join_origins(first.origins, here.origins, self.lost)
+        if MANY in first.origins:
+            self.say(scope_at(at), Code.MANY_ORIGINS, TOLD_TOGETHER)
+        return here.arriving(frozenset([known[-1]]))
 
     def _take_again(
         self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]
@@ -614,22 +628,16 @@ class TaskMachine(Interpreter[Arrived]):
             return here
         return here.with_points(self.task.assign(here.points, one, scope_at(at)))
 
-    def begin(self, origins: frozenset[int], modes: Any) -> Arrived:
+    def begin(self, origins: Origins, modes: Any) -> Arrived:
         """Return how the arm comes to where the task begins: no point is assigned."""
-        return Arrived(origins, modes, Points(alike=self.task.are_alike))
-
-    def settle_points(self) -> None:
-        """Forget what moves take of data that hold other values on other ways."""
-        for visit in self.visits:
-            if not visit.agreed:
-                visit.goal = visit.goal.lost
+        return Arrived(origins, modes, Points(alike=self.task.are_alike), self.lost)
 
     def list_changed_beside(self) -> frozenset[str]:
         """List names of data that change in ways that are not followed.
 
         What a routine declares changes for nothing else.
         """
-        rows = self._rows_of({*self.beside, *self._list_beside()})
+        rows = self.rows_of({*self.beside, *self._list_beside()})
         changed = {
             data.name for at, row in rows
             for data in self.task.list_changes(self.texts[at].statement(row))
@@ -646,6 +654,11 @@ class TaskMachine(Interpreter[Arrived]):
     def pause(self, here: Arrived) -> None:
         """Note that the arm may stop where it stands, although a zone is written."""
         self.paused |= here.origins
+
+    def list_visits(self, origins: Origins) -> set[int]:
+        """Return visits; of those that are not told apart all that there may be."""
+        every = origins | self.lost if MANY in origins else origins
+        return {k for k in every if k >= 0}
 
     def find_unsure_stops(self) -> set[int]:
         """Return the visits at which it is not known whether the arm stops."""
@@ -762,12 +775,8 @@ class TaskMachine(Interpreter[Arrived]):
             for visit in self.read_visits(one, scope.at(row), None):
                 yield visit.goal
 
-    def rows_beside(self) -> Iterator[tuple[int, int]]:
-        """Yield statements that run in ways that are not followed: file and row."""
-        return self._rows_of(self.beside)
-
-    def _rows_of(self, parts: set[tuple[int, int, int]]) -> Iterator[tuple[int, int]]:
-        """Yield statements, and those of the routines that they call."""
+    def rows_of(self, parts: set[tuple[int, int, int]]) -> Iterator[tuple[int, int]]:
+        """Yield statements, by file and row, and those of routines that they call."""
         for file, first, behind in reach(sorted(parts), self._list_calls, tuple):
             yield from ((file, row) for row in range(first, behind))
 
@@ -817,5 +826,7 @@ def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
         at_once = machine.at_once and not machine.beside
         machine = kind(task=task, start=start, at_once=at_once)
         machine.run()
-    machine.settle_points()
+    for visit in machine.visits:
+        if not visit.agreed:  # what it takes holds other values on other ways
+            visit.goal = visit.goal.lost
     return machine

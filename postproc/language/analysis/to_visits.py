@@ -33,6 +33,7 @@ from postproc.language.analysis.found_visits import (
     whole_name,
 )
 from postproc.language.analysis.move_runs import within
+from postproc.language.analysis.origins import number_origins
 from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
@@ -184,8 +185,8 @@ class TaskCollector(ABC):
         for number, text in enumerate(self.machine.texts):
             mine = c.file == number
             c.line[mine] = text.begin_line[row[mine]]
-        c.motion[:] = self._spread((v.motion for v in found), np.int64)
-        c.target[:] = self._spread((v.goal.target for v in found), np.int64)
+        c.kind[:] = self._spread((v.motion for v in found), np.int64)
+        c.meaning[:] = self._spread((v.goal.target for v in found), np.int64)
         c.via[:] = self._spread((v.via for v in found), bool)
         c.arc_angle = self._spread((v.arc_angle for v in found), float)
         c.block = np.append(self.begin, -1)[_blocks(found)].astype(np.int32)[owner]
@@ -258,11 +259,10 @@ class TaskCollector(ABC):
 
     def _graph(self) -> visits.Graph:
         """Translate origins to visits in program order: they end a run."""
-        ends = (self.begin + self.counts - 1).tolist()
-        last = dict(zip(self.order, ends, strict=True))
-        origins = [
-            sorted(last[p] if p >= 0 else p for p in v.origins) for v in self.found
-        ]
+        ends = self.begin + self.counts - 1
+        last = np.empty(len(ends), np.int64)
+        last[self.order] = ends
+        origins = [number_origins(v.origins, last) for v in self.found]
         return chain_visits(self.counts, origins)
 
     def _pin(
@@ -397,7 +397,7 @@ def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> Mapping[st
 def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
     """Yield where moves go that run in ways that are not followed, and say so."""
     files = machine.task.files  # and no others: of those beside the task nothing moves
-    for file, row in sorted({*machine.rows_beside()}):
+    for file, row in sorted({*machine.rows_of(machine.beside)}):
         if file >= len(files) or not files[file].is_move(row):
             continue
         text = machine.texts[file]

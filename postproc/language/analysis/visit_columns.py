@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +22,7 @@ from postproc.arrays import (
 )
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import visits
-from postproc.language.analysis.conditions import (
-    ConditionColumns,
-    Conditions,
-    VisitMotion,
-)
+from postproc.language.analysis.conditions import ConditionColumns, Conditions
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
 from postproc.language.text.source import NumberSpans, Source
@@ -65,8 +62,8 @@ class VisitColumns:
         short = np.int32 if numbers < 2**31 else np.int64
         self.file = np.zeros(n, dtype=np.int32)
         self.line = np.zeros(n, dtype=np.int32)
-        self.motion = np.zeros(n, dtype=np.int8)
-        self.target = np.zeros(n, dtype=np.int8)
+        self.kind = np.zeros(n, dtype=np.int8)
+        self.meaning = np.zeros(n, dtype=np.int8)
         self.via = np.zeros(n, dtype=bool)
         self.fly = np.zeros(n, dtype=bool)
         self.arc_angle = np.broadcast_to(np.nan, n)
@@ -118,31 +115,31 @@ def to_visits(
     """
     c = columns
     conditions = ConditionColumns(c.conditions, c.condition)
-    own = VisitMotion(c.motion, c.via, c.fly, c.arc_angle, c.block, c.curved)
+
+    def own(*names: str) -> dict[str, Any]:
+        return {name: slim(getattr(c, name)) for name in names}
+
     return visits.Visits(
         files=tuple(files),
         place=visits.PlaceColumns(
-            slim(c.file), slim(c.line), visits.texts_of(len(c), c.measured)
+            **own("file", "line"), measure_id=visits.texts_of(len(c), c.measured)
         ),
         target=visits.TargetColumns(
-            meaning=slim(c.target),
+            **own("meaning", "distance_mm", "config", "config_given", "name", "shift"),
             values=c.values,
-            distance_mm=slim(c.distance_mm),
-            aux=slim(c.aux),
-            config=slim(c.config),
+            aux=c.aux,
             configs=tuple(c.configs),
-            config_given=slim(c.config_given),
             literal=literal,
             follows=slim(follows),
-            name=slim(c.name),
             names=c.names,
-            shift=slim(c.shift),
             shifts=tuple(c.shifts),
         ),
         frame=conditions.frame(),
-        motion=conditions.motion(own),
-        zone=conditions.zone(),
-        speed=conditions.speed(),
+        motion=conditions.motion(
+            **own("kind", "via", "fly", "arc_angle", "block", "curved")
+        ),
+        zone=conditions.part(visits.ZoneColumns, "zone."),
+        speed=conditions.part(visits.SpeedColumns),
         graph=graph,
         reason=slim(c.reason),
         reasons=tuple(c.reasons),
@@ -316,7 +313,7 @@ def _literals(
         file=slim(file),
         line=line,
         places=places,
-        joints=columns.target[visit] == visits.Meaning.JOINTS,
+        joints=columns.meaning[visit] == visits.Meaning.JOINTS,
         name=columns.names.take(own) if own.any() else unnamed,
         shared=slim(_any(columns.shared, literal, len(slots))),
         taught=slim(_any(columns.taught, literal, len(slots))),

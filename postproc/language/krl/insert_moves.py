@@ -31,20 +31,18 @@ class KrlSplitter(TaskSplitter):
     """The files of a job, to put points on the ways of moves."""
 
     head = re.compile(r"\s*(S?LIN|S?CIRC)\b", re.I)
+    kind = said.KrlMove
     unsized: str = (
         "points on its way would be passed at a distance that is not known: set "
         "$APO.CDIS before it"
     )
     keeps_aux: bool = True
 
-    def list_problems(self, file: int, line: int) -> Iterator[tuple[str, object]]:
+    def list_problems(
+        self, file: int, row: int, move: said.KrlMove
+    ) -> Iterator[tuple[str, object]]:
         """Yield what may forbid points on a way, see `Splitter.list_problems`."""
         own = self.task.files[file]
-        row = own.find_move(line)
-        move = own.text.statement(row)
-        if not isinstance(move, said.KrlMove):
-            yield "it does not stand alone on its line", True
-            return
         yield self._beside, self._beside
         system = "it stands in a file of the controller, which is not rewritten"
         yield system, own.is_system
@@ -54,7 +52,7 @@ class KrlSplitter(TaskSplitter):
         yield "it ends at an angle (CA)", move.angle is not None
         triggered = self._triggered is None or (file, row) in self._triggered
         yield "a TRIGGER belongs to it, or to a move beside it", triggered
-        in_form = is_of_form(own.text.source, line)
+        in_form = is_of_form(own.text.source, own.text.line(row))
         yield "an inline form would drop the points when it is edited", in_form
 
     def _statements(self) -> Iterator[ir.SourceStatement]:
@@ -108,10 +106,6 @@ class KrlSplitter(TaskSplitter):
         word = command.name if isinstance(command, said.EnumValue) else "#out_"
         return not word.startswith("#out_")
 
-    def is_plain_move(self, one: ir.SourceStatement) -> bool:
-        """Return True for every move."""
-        return isinstance(one, said.KrlMove)
-
     def lay_out(
         self, source: Source, start: int, code: str, head: re.Match[str]
     ) -> KrlLayout:
@@ -124,6 +118,9 @@ class KrlSplitter(TaskSplitter):
         settings = code[with_.end() : stop].strip() if with_ else ""
         indent, word = code[: head.start(1)], head[1].lower()
         return KrlLayout(source, start, code, indent, ";", word, first, settings)
+
+
+SPLITTER = KrlSplitter
 
 
 @dataclass(frozen=True)

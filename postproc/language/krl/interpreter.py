@@ -299,7 +299,12 @@ class KrlMachine(TaskMachine):
         """Allow for what a statement reads, and for what its functions do."""
         for part in self.list_asked(one):
             if isinstance(part, ir.FunctionCall):
-                here = self._function(at, part.name, here)
+                name = part.name
+                still = name in FUNCTIONS or name in STILL
+                still = still or self.declares_motionless(name)
+                after = self.call_function(at, name, still, here)
+                own = name in self.task.routines
+                here = _halt(here, None) if own and after is here else after
             else:
                 given = isinstance(one, ir.Assignment) and part is one.target
                 known = part.name in PLANNED or isinstance(one, said.KrlMove)
@@ -312,13 +317,6 @@ class KrlMachine(TaskMachine):
         """Return True for functions and system variables."""
         system = isinstance(part, ir.DataObject) and part.name.startswith("$")
         return system or super().is_asked(part)
-
-    def _function(self, at: At, name: str, here: Arrived) -> Arrived:
-        """Allow for what a function does."""
-        still = name in FUNCTIONS or name in STILL or self.declares_motionless(name)
-        after = self.call_function(at, name, still, here)
-        own = name in self.task.routines
-        return _halt(here, None) if own and after is here else after
 
     # Interrupts and triggers.
 
@@ -452,11 +450,11 @@ class KrlMachine(TaskMachine):
         """
         found: dict[int, frozenset[Reason]] = {}
         for why, origins in self._before.items():
-            reached = set(origins)
+            reached = self.list_visits(frozenset(origins))
             for _ in range(FURTHEST_AHEAD):
-                behind = [self.visits[k] for k in reached if k >= 0]
+                behind = [self.visits[k] for k in reached]
                 before = [v.origins for v in behind if not v.modes.halted]
-                reached = reached.union(*before)
+                reached |= self.list_visits(frozenset().union(*before))
             for k in reached:
                 found[k] = found.get(k, frozenset()) | {why}
         return found

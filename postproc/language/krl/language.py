@@ -10,7 +10,6 @@ from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
 from postproc.language import ir, language
 from postproc.language.analysis.task_language import TaskLanguage
-from postproc.language.insert_moves import Splitter
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
@@ -21,8 +20,6 @@ from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import KrlCollector
 from postproc.language.krl.user_sources import acting_sources
-from postproc.language.measuring_program import MeasuringProgram, refuse_other_name
-from postproc.language.text.source import Source
 
 # Switches of the controller's own accuracy model, and the words that switch it off.
 _ACCURACY = {
@@ -61,6 +58,7 @@ class Krl(TaskLanguage):
         re.compile(r"\s*([A-Za-z_$]\w*(?:\[[^\]]*\])?)\s*="),
         re.compile(r"\s*([A-Za-z_]\w*)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)?"),
     )
+    named_as_file = True
     names_numbers = True
 
     def name_main(self, files: Sequence[KrlFile]) -> tuple[str, str]:
@@ -75,12 +73,6 @@ class Krl(TaskLanguage):
             raise ProgramError(name, problem, "Give the .src of a program")
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
-
-    def splitter(self, sources: Sequence[Source]) -> Splitter:
-        """Parse the files of a job to put points on the ways of its moves."""
-        from postproc.language.krl.insert_moves import KrlSplitter
-
-        return KrlSplitter(self.parse(sources, language.Start()))
 
     def reads(
         self,
@@ -97,13 +89,6 @@ class Krl(TaskLanguage):
     def read_archive(self, folder: Path) -> language.Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
         return read_archive(folder)
-
-    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
-        """Write joint moves that stop, with comments ``MEASURE``."""
-        from postproc.language.krl.measuring_program import write_krl
-
-        refuse_other_name(program, file.name, file.stem)
-        return write_krl(program)
 
 
 LANGUAGE = Krl

@@ -26,7 +26,7 @@ _LINES = (
 )
 
 
-def write_krl(program: measuring_program.MeasuringProgram) -> str:
+def write(program: measuring_program.MeasuringProgram) -> str:
     """Write a source: its points stand in the moves, so it needs no data list."""
     lines = [
         "&ACCESS RVP",

@@ -149,7 +149,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     constants: ClassVar = {"true": 1.0, "false": 0.0}
     functions = "deffct"
     by_name = True
-    divides = False  # whole numbers divide otherwise than others
+    uncertain = ("/",)  # whole numbers divide otherwise than others
     apart = True
 
     def new_uses(self) -> NamesUsed:

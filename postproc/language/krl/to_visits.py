@@ -89,12 +89,12 @@ class KrlCollector(to_visits.TaskCollector):
             base=self.base,
             uframe=modes.base.pose,
             taught=(modes.tool.taught, False, modes.base.taught),
-            remote=modes.interpolation == "#tcp",
+            tool_remote=modes.interpolation == "#tcp",
             care=(Switch.ON if joint else Switch.OFF,) * 3,
-            law=_law(v, modes),
+            orientation_law=_law(v, modes),
             zone=_zone(v, modes, self.ends[at]),
-            speed=modes.speed if modes.speed > 0 else math.nan,
-            wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
+            linear=modes.speed if modes.speed > 0 else math.nan,
+            wrist_joint=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
             override=modes.share if joint and modes.share > 0.0 else 1.0,
             load=_load(modes),
         )
@@ -211,7 +211,7 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     """
     partial = (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
     for v in (v for v in found if v.goal.target in partial):
-        before = [found[k] for k in v.origins if k >= 0]
+        before = [found[k] for k in machine.list_visits(v.origins)]
         lost = any(one.move.angle is not None for one in before)
         if v.goal.target == Meaning.PARTIAL_POSE:
             own = _frames(machine, v)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from postproc.diagnostics import Code
+from postproc.language.analysis.origins import NOWHERE, Origins, join_origins
 from postproc.language.analysis.shared_map import SharedMap
 from postproc.language.pdl2.values import (
     Nothing,
@@ -15,16 +16,12 @@ from postproc.language.pdl2.values import (
     join_components,
     may_be,
 )
-from postproc.language.visits import ELSEWHERE
 
 Settings = Mapping[str, Value]
 FRAMES = ("tool", "base", "uframe")  # those of the settings that are frames
 
 Log = tuple[str, "Log | None"]
 """A key that was given a value, and those before it: copies share what they share."""
-
-MANY = -3  # origin: one of so many visits that they are not told apart
-MOST_ORIGINS = 500
 
 
 class GivenValues:
@@ -77,7 +74,7 @@ class Store:
     Attributes:
         values: Assigned values. A Nothing at ``job/tab`` hides its elements.
         settings: Frames and motion variables; replaced, never changed.
-        last: Visits the arm may come from; START, ELSEWHERE or MANY.
+        last: Where the arm may come from.
         logs: Elements and fields that a key has been given since it was forgotten,
             by key; some of them may hold nothing any more.
         compound: Keys that ever had elements or fields; shared by all copies.
@@ -91,7 +88,7 @@ class Store:
     values: SharedMap[str, Value] = field(default_factory=SharedMap)
     logs: SharedMap[str, Log] = field(default_factory=SharedMap)
     settings: Settings = field(default_factory=dict)
-    last: frozenset[int] = frozenset()
+    last: Origins = frozenset()
     compound: set[str] = field(default_factory=set)
     changing: frozenset[str] = frozenset()
     exposed: frozenset[str] = frozenset()
@@ -162,7 +159,7 @@ class Store:
     def lose_place(self) -> None:
         """Where the arm is is no longer known."""
         self.lost |= self.last
-        self.last = frozenset({ELSEWHERE})
+        self.last = NOWHERE
 
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""
@@ -184,13 +181,8 @@ class Store:
 
     def merge(self, other: Store) -> bool:
         """Take in what may hold too; tell whether anything changed."""
-        changed = False
-        if MANY not in self.last and not other.last <= self.last:
-            both = self.last | other.last
-            many = MANY in both or len(both) > MOST_ORIGINS
-            # The sum of the sizes of such sets stays linear in the program.
-            self.last = frozenset({MANY}) if many else both
-            changed = True
+        last = join_origins(self.last, other.last, self.lost)
+        changed, self.last = last is not self.last, last
         if other.settings is not self.settings and other.settings != self.settings:
             a, b, unset = (
                 self.settings,

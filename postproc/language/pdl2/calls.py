@@ -8,6 +8,7 @@ from dataclasses import replace
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At
+from postproc.language.analysis.origins import NOWHERE
 from postproc.language.language import Record
 from postproc.language.pdl2 import external_routines, side_effects
 from postproc.language.pdl2 import syntax as ast
@@ -15,7 +16,6 @@ from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.conditions import DISTURBING
 from postproc.language.pdl2.evaluate import (
     bare,
-    component_index,
     copy_parts,
     fill,
     invalidate_key,
@@ -41,7 +41,6 @@ from postproc.language.pdl2.values import (
     Value,
     points_of,
 )
-from postproc.language.visits import ELSEWHERE
 
 # Routines that cannot be followed: their moves are listed, what they change forgotten.
 #
@@ -99,7 +98,7 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
     for row in range(body.first + 1, body.last):
         statement = program.lines.statement(row)
         if isinstance(statement, ast.Move):
-            store = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+            store = Store(lambda key: nothing, last=NOWHERE)
             store.forget_frames(why)
             at = Execution(
                 here.world, place, row, store, here.volatile, context, reason
@@ -345,13 +344,13 @@ def _assign_component(
     if reference.name.startswith("$"):
         return False
     target = here.locate(reference)
-    if not target.exact or component_index(target) < 0:
+    if not target.exact or target.number < 0:
         return False
     new = here.read_number(value)
     held = here.store.read(target.key)
     if not isinstance(held, Position):
         held = _blank(here, reference.name, held)
-    held = held.with_component(component_index(target), new)
+    held = held.with_component(target.number, new)
     here.store.write(target.key, set_owner(here, reference.name, target.key, held))
     return True
 
@@ -423,15 +422,13 @@ def _new_value(
         held = _blank(here, statement.target.name, held)
     number = value if isinstance(value, float) else None
     match target.component:
-        case ("pos", _):
+        case "pos":
             if not isinstance(value, Position):
                 known = isinstance(value, Nothing)
                 return value if known else Nothing("it is no position")
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
             return held.with_aux(axis, number)
-        case ("joint", axis):
-            return held.with_aux(axis - 6, number)
     return Nothing("a part of it known only at run time is assigned")
 
 

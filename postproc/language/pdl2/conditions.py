@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Indices, Interned, Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.conditions import Conditions, Zone, cell_pose
+from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
 from postproc.language.pdl2.abstract_state import FRAMES, Settings
 from postproc.language.pdl2.values import Nothing, Position, Value
 from postproc.language.shifts import Pose
@@ -77,18 +77,6 @@ def disturbance(settings: Settings) -> Reason:
     return Reason(Code.LOAD_UNKNOWN, text)
 
 
-def load_of_settings(settings: Settings) -> tuple[float, ...]:
-    """Return mass [kg] and centre [m] of the load that settings state, NaN for none."""
-    mass = settings.get(PAYLOAD)
-    stated = mass if isinstance(mass, float) and mass >= 0.0 else math.nan
-    return (stated, *(math.nan,) * 3)
-
-
-def weaves(settings: Settings) -> bool:
-    """Return True if the tool weaves on the way, or may: ``$WEAVE_NUM`` is not 0."""
-    return any(settings.get(name, 0.0) != 0.0 for name in WEAVING)
-
-
 class SettingTable:
     """Each distinct state of the settings is read off once."""
 
@@ -129,31 +117,32 @@ class SettingTable:
 def _conditions(settings: Settings) -> Conditions:
     """Say what moves are carried out with under some settings."""
     tool, base, uframe = (settings.get(name) for name in FRAMES)
+    mass = _number(settings, PAYLOAD)
     return Conditions(
         tool=_pose(tool),
         base=_pose(base),
         uframe=_pose(uframe),
         taught=(_is_taught(tool), _is_taught(base), _is_taught(uframe)),
-        remote=settings.get("tool_rmt") is True,
+        tool_remote=settings.get("tool_rmt") is True,
         care=(
             _switch(settings.get("cnfg_care")),
             _switch(settings.get("turn_care")),
             _switch(settings.get("jnt_mturn")),
         ),
         nearest_turn=settings.get("jnt_mturn") is False,
-        law=_orientation_law(settings),
-        wrist=settings.get("ornt_type") == "wrist_jnt",
+        orientation_law=_orientation_law(settings),
+        wrist_joint=settings.get("ornt_type") == "wrist_jnt",
         zone=Zone(
             size_mm=_number(settings, "fly_dist"),
             overlap_percent=_number(settings, "fly_per"),
             blend=_word(settings, "fly_type", _BLENDS),
             rule=_word(settings, "fly_traj", _ZONE_RULES),
         ),
-        speed=_number(settings, "lin_spd"),
+        linear=_number(settings, "lin_spd"),
         turning=_number(settings, "rot_spd"),
         override=_override(settings),
-        load=load_of_settings(settings),
-        weaves=weaves(settings),
+        load=(mass if mass >= 0.0 else math.nan, *NO_LOAD[1:]),
+        weaves=any(settings.get(name, 0.0) != 0.0 for name in WEAVING),
     )
 
 

@@ -14,6 +14,7 @@ from postproc.language.pdl2.values import (
     FARTHEST,
     RUN_TIME,
     Alias,
+    Component,
     Location,
     Nothing,
     Position,
@@ -21,12 +22,11 @@ from postproc.language.pdl2.values import (
     Value,
     Vector,
     add_unknown,
-    binary,
     function,
     invert_frame,
+    operate,
     part_of,
     shift_position,
-    unary,
 )
 
 _DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
@@ -85,12 +85,6 @@ class ProgramPoint:
         lines = self.place.program.lines
         return float(lines.value[lines.first[self.row] + slot])
 
-    def global_slot(self, slot: int) -> int:
-        """Return the job-wide index of a number of this line."""
-        lines = self.place.program.lines
-        base = self.world.slot_base[lines.source.name]
-        return int(base + lines.first[self.row] + slot)
-
     def integer(self, expression: ir.Operand) -> int | None:
         """Return a whole number, None where it is not known."""
         value = self.value(expression)
@@ -128,22 +122,20 @@ class ProgramPoint:
             keys = frozenset(f"{key}[{text}]" for key in keys)
         return Location(keys, exact and len(keys) == 1)
 
-    def _component(
-        self, steps: tuple[str | ir.ElementStep, ...]
-    ) -> tuple[str, int] | None:
+    def _component(self, steps: tuple[str | ir.ElementStep, ...]) -> Component:
         match steps:
-            case (str(name),) if name in COMPONENTS:
-                return (name, 0)
+            case (str(name),) | ("pos", str(name)) if name in COMPONENTS:
+                return COMPONENTS[name]
             case ("pos",):
-                return ("pos", 0)
-            case ("pos", str(name)) if name in COMPONENTS:
-                return (name, 0)
+                return "pos"
             case ("aux", ir.ElementStep((index,))):
                 axis = self.integer(index)
                 return None if axis is None else ("aux", axis)
             case (ir.ElementStep((index,)),):
                 axis = self.integer(index)
-                return None if axis is None else ("joint", axis)
+                if axis is None or 1 <= axis <= 6:
+                    return None if axis is None else axis - 1
+                return "aux", axis - 6
         return None
 
     # ---- reading --------------------------------------------------------------------
@@ -161,13 +153,11 @@ class ProgramPoint:
                 return self.read(expression)
             case ir.Operation("()", (operand,)):
                 return self.value(operand)
-            case ir.Operation(sign, (operand,)):
-                return unary(sign, self.value(operand))
-            case ir.Operation(sign, (left, right)):
-                values = self.value(left), self.value(right)
+            case ir.Operation(sign, operands):
+                values = [*map(self.value, operands)]
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
-                return binary(sign, *values)
+                return operate(sign, *values)
             case ir.Composite(items) if len(items) < 6:
                 return Nothing("it has fewer than six joint values")
             case ir.Composite(items):
@@ -206,9 +196,9 @@ class ProgramPoint:
         held = self.store.read(target.key)
         if target.component == ():
             return held
-        at = component_index(target)
-        if at >= 0:
-            self.world.pin(held, "the program computes with a part of it", (at,))
+        if target.number >= 0:
+            why = "the program computes with a part of it"
+            self.world.pin(held, why, (target.number,))
         return part_of(held, target.component)
 
     def _unsteady(self, target: Location) -> bool:
@@ -265,7 +255,10 @@ class ProgramPoint:
         """Return a number, and where in the text it is written or comes from."""
         match expression:
             case ir.Num(slot):
-                return SourceNumber(self.real(expression), self.global_slot(slot))
+                lines = self.place.program.lines
+                base = self.world.slot_base[lines.source.name]
+                at = int(base + lines.first[self.row] + slot)
+                return SourceNumber(self.real(expression), at)
             case ir.Operation("()", (operand,)):
                 return self.read_number(operand)
             case ir.DataObject():
@@ -286,7 +279,7 @@ class ProgramPoint:
         if reference.name.startswith("$"):
             return None
         target = self.locate(reference)
-        at = component_index(target)
+        at = target.number
         if at < 0 or not target.exact or self._unsteady(target):
             return None
         held = self.store.read(target.key)
@@ -339,16 +332,6 @@ class ProgramPoint:
         return replace(self._components(arguments[:6]), config=config)
 
 
-def component_index(target: Location) -> int:
-    """Return which of the six numbers a reference means, -1 for anything else."""
-    match target.component:
-        case ("joint", axis) if 1 <= axis <= 6:
-            return axis - 1
-        case (str(name), _) if name in COMPONENTS:
-            return COMPONENTS[name]
-    return -1
-
-
 # Whole records, arrays and nodes: what they hold is copied part by part.
 
 SINGLE = frozenset(
@@ -399,7 +382,8 @@ def parts_of(here: ProgramPoint, origin: ir.DataObject) -> dict[str, Value]:
     for key in sorted(here.locate(origin).keys):
         for part in parts_under(here, key):
             value = here.store.read(part)
-            if not isinstance(value, Nothing) or value.of or is_standard(part):
+            standard = part.rpartition(".")[2].startswith("$")  # a node's: $main_pos
+            if not isinstance(value, Nothing) or value.of or standard:
                 found[part[len(key) :]] = value
     return found
 
@@ -408,11 +392,6 @@ def parts_under(here: ProgramPoint, key: str) -> list[str]:
     """Return the keys of elements and fields that a key has or ever had."""
     world = here.world
     return world.first_parts(key) + world.later_parts(key) + here.store.parts(key)
-
-
-def is_standard(key: str) -> bool:
-    """Tell whether a key is that of a standard field of a node: ``n.$main_pos``."""
-    return key.rpartition(".")[2].startswith("$")
 
 
 def invalidate_key(here: ProgramPoint, key: str, why: str) -> None:

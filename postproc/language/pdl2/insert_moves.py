@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from postproc.language.pdl2.clones import code_of
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program
 from postproc.language.text.source import CloneError, Span
+from postproc.language.text.statement_table import Statements
 
 _EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
 _ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)
@@ -42,20 +44,19 @@ class Pdl2Splitter(Splitter):
     """
 
     programs: Sequence[Program]
+    kind = ast.Move
 
-    def list_problems(self, file: int, line: int) -> Iterator[tuple[str, object]]:
+    def list_problems(
+        self, file: int, row: int, move: ast.Move
+    ) -> Iterator[tuple[str, object]]:
         """Yield what may forbid points on a way, see `Splitter.list_problems`."""
+        program = self.programs[file]
         yield self._events, self._events
-        program, row = self.programs[file], self._row(file, line)
-        move = program.lines.statement(row)
-        if not isinstance(move, ast.Move) or program.lines.line(row) != line:
-            yield "it does not stand alone on its line", True
-            return
         yield "it ends on a condition (TIL)", move.til is not None
         yield "a condition is enabled along it (WITH CONDITION)", move.conditions
         yield "another arm moves along (SYNCMOVE)", move.sync
         yield "it does not go TO a place", move.how != "TO" or len(move.where) != 1
-        code = code_of(program, line)
+        code = code_of(program, program.lines.line(row))
         cut = _HEAD.match(code) is None or code.rstrip().endswith(",")
         yield "it stands on several lines", cut
         settings = _WITH.search(code)
@@ -66,9 +67,10 @@ class Pdl2Splitter(Splitter):
         goes_on = _ADVANCE.search(code) and not isinstance(after, ast.Move)
         yield "the program goes on while it moves (ADVANCE)", goes_on
 
-    def _row(self, file: int, line: int) -> int:
-        """Return the row of a move."""
-        return int(np.searchsorted(self.programs[file].lines.begin_line, line))
+    def find(self, file: int, line: int) -> tuple[Statements[Any], int]:
+        """Return the statements of a file, and the row of a move."""
+        lines = self.programs[file].lines
+        return lines, int(np.searchsorted(lines.begin_line, line))
 
     @cached_property
     def _events(self) -> str:
@@ -83,18 +85,9 @@ class Pdl2Splitter(Splitter):
                 return "a condition that these files do not define may be enabled"
         return ""
 
-    def statements_before(self, file: int, line: int) -> Iterator[ir.SourceStatement]:
-        """Yield what stands in front of a move, see `Splitter.statements_before`."""
-        rows = range(self._row(file, line) - 1, -1, -1)
-        return map(self.programs[file].lines.statement, rows)
-
     def is_setting(self, one: ir.SourceStatement) -> bool:
         """Return True if motion variables are set."""
         return isinstance(one, ir.Assignment) and one.target.name in _MOTION
-
-    def is_plain_move(self, one: ir.SourceStatement) -> bool:
-        """Return True for every move."""
-        return isinstance(one, ast.Move)
 
     def layout(self, file: int, line: int) -> Pdl2Layout:
         """Look at a move, see `Splitter.layout`."""

@@ -10,6 +10,7 @@ from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
+from postproc.language.analysis.origins import NOWHERE
 from postproc.language.language import Start
 from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
@@ -40,7 +41,7 @@ from postproc.language.pdl2.side_effects import (
 )
 from postproc.language.pdl2.to_visits import Collector
 from postproc.language.pdl2.variable_file import VariableFile
-from postproc.language.visits import ELSEWHERE, START, Diagnostic, Meaning, Visits
+from postproc.language.visits import START, Diagnostic, Meaning, Visits
 from postproc.robot.trajectory import Motion
 
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
@@ -170,7 +171,7 @@ def prepare(
     """
     if machine.cycle_left:
         left = here.store.copy()
-        left.last = frozenset({ELSEWHERE})
+        left.last = NOWHERE
         machine.begin_cycle(here.context, left)
     if _waits(statement):
         machine.paused |= here.store.last
@@ -229,7 +230,7 @@ def _cancel(here: Execution) -> None:
     programs = here.world.programs()
     if any(_RUNNING.search(one.lines.source.data) for one in programs):
         here.store.lost |= here.store.last
-        here.store.last |= {ELSEWHERE}
+        here.store.last |= NOWHERE
 
 
 def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
@@ -280,12 +281,12 @@ def run_broken(machine: Machine, here: Execution) -> None:
         said = ast.action(program.lines.statement(row))
         if isinstance(said, ast.Move):
             here.row = row
-            here.store.last = frozenset({ELSEWHERE})
+            here.store.last = NOWHERE
             move(machine, here, said)
     inside = list_live(here.world, here.place, body.first, body.last)
     calls.take_effects(here, inside, f"{why}: it may be used in a computation", why)
     here.store.forget_frames(why)
-    here.store.last = frozenset({ELSEWHERE})
+    here.store.last = NOWHERE
 
 
 @dataclass(frozen=True)
@@ -391,7 +392,7 @@ def _handlers(machine: Machine, store: Store) -> None:
     """Condition handlers run at any time: nothing they change is ever known."""
     world = machine.world
     nothing = values.Nothing("a condition handler runs at any time")
-    unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+    unknown = Store(lambda key: nothing, last=NOWHERE)
     unknown.changing = world.changing
     unknown.given, unknown.lost = store.given, store.lost
     unknown.forget_frames(nothing.why)

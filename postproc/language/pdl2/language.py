@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from postproc.exceptions import ProgramError
 from postproc.files import base_name
 from postproc.language.insert_moves import Splitter
 from postproc.language.language import Cloner, JobReading, Language, Start
-from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.nested import name_parts
@@ -120,12 +118,6 @@ class Pdl2(Language):
         if any(map(_NESTED.match, lines)):
             return name_parts(Source(file, b"\n".join(lines)), wanted)
         return super().target_names(file, lines, wanted)
-
-    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
-        """Write joint moves that stop, with comments ``MEASURE``."""
-        from postproc.language.pdl2.measuring_program import write_pdl2
-
-        return write_pdl2(program)
 
     def prepare(self) -> None:
         """Load the parsers of programs and variable files."""

@@ -13,19 +13,14 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.interpreter import Interpreter, calls_around
-from postproc.language.pdl2.abstract_state import (
-    MANY,
-    MOST_ORIGINS,
-    GivenValues,
-    Settings,
-    Store,
-)
+from postproc.language.analysis.origins import MANY, NOWHERE, TOLD_TOGETHER, Origins
+from postproc.language.pdl2.abstract_state import GivenValues, Settings, Store
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
 from postproc.language.pdl2.side_effects import circles, list_invoked
 from postproc.language.pdl2.values import Nothing, Position
-from postproc.language.visits import ELSEWHERE, Meaning
+from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
 Numbers = tuple[float | None, ...]
@@ -101,7 +96,7 @@ class MoveRun:
     rows: Ints
     form: Ints
     forms: Mapping[int, MoveForm]
-    predecessors: frozenset[int]
+    predecessors: Origins
     settings: Settings
     point: Ints
     goals: Mapping[int, Goal]
@@ -124,7 +119,7 @@ def _only(form: MoveForm) -> dict[int, MoveForm]:
 def single(
     here: Execution,
     form: MoveForm,
-    predecessors: frozenset[int],
+    predecessors: Origins,
     settings: Settings,
     goal: Goal,
 ) -> MoveRun:
@@ -160,8 +155,6 @@ class Machine(Interpreter[Store]):
         interrupted: A condition handler may move the arm at any time.
         handler: Why no move can be compensated that a handler may interrupt.
         cycle_left: A condition handler may begin the cycle again at any time.
-        paused: Visits behind which the arm may stop before the program goes on.
-        lost: Visits behind which it may go anywhere.
         given: What variables are given at any time.
     """
 
@@ -173,35 +166,25 @@ class Machine(Interpreter[Store]):
     interrupted: bool = False
     handler: Reason = NO_REASON
     cycle_left: bool = False
-    paused: set[int] = field(default_factory=set)
-    lost: set[int] = field(default_factory=set)
     given: GivenValues = field(default_factory=GivenValues)
     _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
     next_id: int = 0
-
-    def visit_id(self, key: Key, count: int = 1) -> int:
-        """Return the first id of the visits of a place."""
-        if key not in self.ids:
-            self.ids[key] = self.next_id
-            self.next_id += count
-        return self.ids[key]
 
     def record(self, here: Execution, sub: int, arrival: MoveRun) -> int:
         """Keep visits; return the id of the first."""
         key = (here.context, here.place.offset + here.row, sub)
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:
-            text = (
-                f"more than {MOST_ORIGINS} moves may come before this one: they are "
-                "not followed separately, and the approach direction is not known"
-            )
-            here.report_once(Code.MANY_ORIGINS, str(here.row), text)
-        return self.visit_id(key, len(arrival))
+            here.report_once(Code.MANY_ORIGINS, str(here.row), TOLD_TOGETHER)
+        if key not in self.ids:
+            self.ids[key] = self.next_id
+            self.next_id += len(arrival)
+        return self.ids[key]
 
-    def predecessors(self, here: Execution) -> frozenset[int]:
+    def predecessors(self, here: Execution) -> Origins:
         """Return where the arm may come from."""
         last = here.store.last
-        return last | {ELSEWHERE} if self.interrupted else last
+        return last | NOWHERE if self.interrupted else last
 
     def find_calls(
         self, place: Place, statement: ir.SourceStatement

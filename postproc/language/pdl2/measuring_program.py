@@ -26,7 +26,7 @@ _LINES = (
 )
 
 
-def write_pdl2(program: MeasuringProgram) -> str:
+def write(program: MeasuringProgram) -> str:
     """Write it with $TOOL for the probe points, and a DELAY at every measured stop."""
     lines = [
         *(f"-- {text}" for text in program.heading),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.origins import NOWHERE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
@@ -19,7 +20,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.side_effects import goes_to_target, references
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, add_unknown
-from postproc.language.visits import ELSEWHERE, Meaning
+from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
 # Nodes of paths as destinations: where the one position of a node stands.
@@ -265,16 +266,16 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
         via = single(here, form, predecessors, settings, goal)
         predecessors = frozenset({machine.record(here, _VIA, via)})
         if machine.interrupted:  # the arm may have been moved off the way
-            predecessors |= {ELSEWHERE}
+            predecessors |= NOWHERE
     goal = goal_of(here, statement, motion)
     form = MoveForm(motion, reason, fly=statement.fly)
     end = single(here, form, predecessors, settings, goal)
     arrived = machine.record(here, _END, end)
     store.last = frozenset({arrived})
     if several and goal.target in _FROM_HERE:
-        store.last |= {ELSEWHERE}
+        store.last |= NOWHERE
     if statement.til is not None or whose is None:
-        store.last |= predecessors if statement.til is None else {ELSEWHERE}
+        store.last |= predecessors if statement.til is None else NOWHERE
 
 
 ALONG_WITH = Reason(

@@ -19,6 +19,7 @@ from postproc.arrays import (
 )
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.call_context import Point
+from postproc.language.analysis.origins import NOWHERE, number_origins
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
     Numbering,
@@ -28,7 +29,6 @@ from postproc.language.analysis.visit_columns import (
     to_visits,
 )
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import MANY
 from postproc.language.pdl2.conditions import SettingTable
 from postproc.language.pdl2.job import World, base_variable
 from postproc.language.pdl2.machine import (
@@ -45,7 +45,6 @@ from postproc.language.text.comment_directives import MEASURE
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import number_in_order
 from postproc.language.visits import (
-    ELSEWHERE,
     Graph,
     Literals,
     Meaning,
@@ -228,10 +227,9 @@ class Collector:
         """Translate predecessor ids to visits, in CSR form."""
         origins = []
         for run in self.runs:  # the visits that its first move may come from
-            found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
-            if MANY in run.predecessors or id(run.place.body) in self.machine.recursive:
-                found.add(ELSEWHERE)
-            origins.append(sorted(found))
+            again = id(run.place.body) in self.machine.recursive
+            found = run.predecessors | (NOWHERE if again else frozenset())
+            origins.append(number_origins(found, visit))
         return chain_visits(np.diff(self.offsets), origins)
 
     def _fill(self) -> None:
@@ -258,7 +256,7 @@ class Collector:
         c, visit, lines = self.columns, moves.visit, moves.program.lines
         c.file[visit] = self.machine.world.files.index(lines.source.name)
         c.line[visit] = lines.begin_line[moves.row]
-        c.motion[visit] = moves.of_forms(lambda form: form.motion)
+        c.kind[visit] = moves.of_forms(lambda form: form.motion)
         c.fly[visit] = moves.of_forms(lambda form: form.fly)
         c.via[visit] = moves.of_forms(lambda form: form.via)
 
@@ -308,7 +306,7 @@ class Collector:
                 numbers = first[:, None] + np.array(form.slots, dtype=np.int32)
                 c.values[mine[k]] = lines.value[numbers]
                 c.slots[mine[k]] = numbers + base
-            c.target[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
+            c.meaning[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
             if form.config is not None:
                 c.config[mine] = self.columns.configs[form.config]
                 c.config_given[mine] = True
@@ -317,7 +315,7 @@ class Collector:
         for k in chunks(len(mine)):
             wrong[k] = ~np.isfinite(c.values[mine[k]]).all(axis=1)
         bad = mine[wrong]
-        c.target[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
+        c.meaning[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
         if len(bad):
             moves.first[np.flatnonzero(here)[wrong]] = self.columns.reasons[_UNREAD]
         taught = self.machine.world.taught_lines[lines.source.name]
@@ -363,7 +361,7 @@ class Collector:
             c.config[visit[mine]] = self.columns.configs[layout.config or ""]
             c.config_given[visit[mine]] = layout.config is not None
             joints = layout.kind == "JNTP"
-            c.target[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
+            c.meaning[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
             for column, axis in enumerate(layout.axes):
                 if 1 <= axis <= c.aux.shape[1]:
                     c.aux[visit[mine], axis - 1] = entries.aux[rows[mine], column]
@@ -376,7 +374,7 @@ class Collector:
         index = np.array([k for k, _, _ in found])
         visit = moves.visit[index]
         goals = [goal for _, _, goal in found]
-        c.target[visit] = [goal.target for goal in goals]
+        c.meaning[visit] = [goal.target for goal in goals]
         c.values[visit] = np.array([goal.numbers for goal in goals], dtype=float)
         distances = np.array([goal.distance for goal in goals], dtype=float)
         if np.isfinite(distances).any():
@@ -426,7 +424,7 @@ class Collector:
         kinds += [
             moves.form,
             self._setting[moves.visit],
-            c.target[moves.visit],
+            c.meaning[moves.visit],
             moves.last,
         ]
         which, example = _alike(kinds)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from postproc.diagnostics import Code
-from postproc.language.analysis.functions import COMPARISONS, apply_function
+from postproc.language.analysis.functions import (
+    COMPARISONS,
+    apply_function,
+    apply_operator,
+)
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 Numbers = tuple[float | None, ...]
@@ -257,75 +260,57 @@ def _derive_position(
 
 RUN_TIME = Nothing("it is known only at run time")
 
-_ARITHMETIC: dict[str, Callable[[float, float], float]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "DIV": lambda a, b: float(math.trunc(a / b)),
-    "MOD": math.fmod,
-}
+_LOGICAL = ("AND", "OR", "NOT")
+_NO_RESULT = Nothing("the arithmetic has no result")
 
 
-def part_of(held: Value, component: tuple[str, int] | tuple[()] | None) -> Value:
+Component = int | str | tuple[str, int] | tuple[()] | None
+"""Which part of a position: of its six numbers, ``pos``, or (``aux``, i) of an axis.
+
+() is the whole value, None a part that only the run tells.
+"""
+
+
+def part_of(held: Value, component: Component) -> Value:
     """Return a component of a position or vector."""
     if not isinstance(held, Position | Vector):
         return held if isinstance(held, Nothing) else RUN_TIME
     number: float | None = None
     match component:
-        case ("pos", _) if isinstance(held, Position):
+        case "pos" if isinstance(held, Position):
             return replace(held, aux=())
         case ("aux", axis) if isinstance(held, Position) and held.aux is not None:
             number = dict(held.aux).get(axis)
-        case ("joint", axis) if 1 <= axis <= len(held.numbers):
-            number = held.numbers[axis - 1]
-        case (str(name), _) if COMPONENTS.get(name, 9) < len(held.numbers):
-            number = held.numbers[COMPONENTS[name]]
+        case int(at) if at < len(held.numbers):
+            number = held.numbers[at]
     return RUN_TIME if number is None else number
 
 
-def unary(sign: str, value: Value) -> Value:
-    """Return what an operator makes of its operand."""
-    if sign == "NOT" and isinstance(value, bool):
-        return not value
-    if isinstance(value, float):
-        return -value if sign == "-" else value
-    if isinstance(value, Vector) and sign == "-" and None not in value.numbers:
-        x, y, z = (-n for n in value.numbers if n is not None)
-        return Vector((x, y, z))
-    return value if isinstance(value, Nothing) else RUN_TIME
-
-
-def binary(sign: str, a: Value, b: Value) -> Value:
+def operate(sign: str, *parts: Value) -> Value:
     """Return what an operator makes of its operands."""
-    if sign in ("AND", "OR"):
-        decisive = sign == "OR"
-        if a is decisive or b is decisive:
-            return decisive
-        if isinstance(a, bool) and isinstance(b, bool):
-            return not decisive
-    if isinstance(a, Position) and isinstance(b, Position) and sign == ":":
-        return compose_frames(a, b)
-    if isinstance(a, Vector) and isinstance(b, Vector) and sign in "+-":
-        return _add(a, b, sign)
-    if sign in COMPARISONS and type(a) is type(b) and isinstance(a, float | str | bool):
-        return COMPARISONS[sign](a, b)  # type: ignore[arg-type]
-    if isinstance(a, float) and isinstance(b, float) and sign in _ARITHMETIC:
-        try:
-            return _ARITHMETIC[sign](a, b)
-        except (ArithmeticError, ValueError):
-            return Nothing("the arithmetic has no result")
-    return next((v for v in (a, b) if isinstance(v, Nothing)), RUN_TIME)
+    vectors = [one.numbers for one in parts if isinstance(one, Vector)]
+    match sign, parts:
+        case ":", (Position() as a, Position() as b):
+            return compose_frames(a, b)
+        case "+" | "-", _ if len(vectors) == len(parts):
+            x, y, z = (_number(sign, one) for one in zip(*vectors, strict=True))
+            return RUN_TIME if math.isnan(x + y + z) else Vector((x, y, z))
+        case _, (str(), str()) if sign in COMPARISONS:
+            return COMPARISONS[sign](*parts)  # type: ignore[arg-type]
+    compares = sign in COMPARISONS
+    truths = sign in _LOGICAL or (compares and isinstance(parts[0], bool))
+    kind = bool if truths else float
+    numbers = [float(one) if type(one) is kind else None for one in parts]
+    found = _number(sign, numbers)
+    if not math.isnan(found):
+        return bool(found) if truths or compares else found
+    if None not in numbers and sign in ("/", "DIV", "MOD"):
+        return _NO_RESULT
+    return next((v for v in parts if isinstance(v, Nothing)), RUN_TIME)
 
 
-def _add(a: Vector, b: Vector, sign: str) -> Value:
-    if None in a.numbers or None in b.numbers:
-        return RUN_TIME
-    x, y, z = (
-        _ARITHMETIC[sign](m, n)  # type: ignore[arg-type]
-        for m, n in zip(a.numbers, b.numbers, strict=True)
-    )
-    return Vector((x, y, z))
+def _number(sign: str, parts: Sequence[float | None]) -> float:
+    return apply_operator(sign, [math.nan if one is None else one for one in parts])
 
 
 def function(name: str, x: float) -> Value:
@@ -341,15 +326,19 @@ class Location:
     Attributes:
         keys: Keys it may mean.
         exact: It means the one key, not some element of it.
-        component: Component of a position: x .. r, pos, ``aux`` and joint indices as
-            (``aux``, i) and (``joint``, i); () for the whole value, None if unknown.
+        component: The part of the value there that is meant.
     """
 
     keys: frozenset[str]
     exact: bool
-    component: tuple[str, int] | tuple[()] | None = ()
+    component: Component = ()
 
     @property
     def key(self) -> str:
         """Return the one key."""
         return next(iter(self.keys))
+
+    @property
+    def number(self) -> int:
+        """Which of the six numbers of a position is meant, -1 for anything else."""
+        return self.component if isinstance(self.component, int) else -1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
@@ -236,17 +236,11 @@ def may_raise(
         return bool(numbers)
     one = inside(one)
     name = one.name if isinstance(one, ir.Instruction) else ""
-    return any(_raises([name, *functions], k, k in declared) for k in numbers)
-
-
-def _raises(called: Sequence[str], number: str, declared: bool) -> bool:
-    """Return True if instructions or functions can raise an error."""
-    if called[0] in RAISING:
-        return True
-    if number[:1].isdigit() or declared:
-        return False
-    starts = RAISED_BY.get(number)
-    return starts is None or any(name.startswith(starts) for name in called)
+    if name in RAISING:
+        return bool(numbers)
+    called, known = [name, *functions], {k for k in numbers if not k[:1].isdigit()}
+    starts = (RAISED_BY.get(k) for k in known.difference(declared))
+    return any(s is None or any(one.startswith(s) for one in called) for s in starts)
 
 
 def may_be_skipped(one: ir.SourceStatement) -> bool:

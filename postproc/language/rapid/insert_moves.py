@@ -35,15 +35,13 @@ class RapidSplitter(TaskSplitter):
     """The modules of a task, to put points on the ways of moves."""
 
     head = re.compile(r"\s*(Move[LC])\b", re.I)
+    kind = ir.Instruction
 
-    def list_problems(self, file: int, line: int) -> Iterator[tuple[str, object]]:
+    def list_problems(
+        self, file: int, row: int, move: ir.Instruction
+    ) -> Iterator[tuple[str, object]]:
         """Yield what may forbid points on a way, see `Splitter.list_problems`."""
         own = self.task.files[file]
-        row = own.find_move(line)
-        move = own.text.statement(row)
-        if not isinstance(move, ir.Instruction):
-            yield "it does not stand alone on its line", True
-            return
         yield self._readers, self._readers
         yield "it stands in a system module, which is not rewritten", own.is_system
         other = move.name not in _WORDS or move.name in self.task.routines
@@ -95,6 +93,9 @@ class RapidSplitter(TaskSplitter):
         return RapidLayout(
             source, start, code, indent, "!", tuple(items), longest=LONGEST_STATEMENT
         )
+
+
+SPLITTER = RapidSplitter
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.declarations import TaskRoutine
+from postproc.language.analysis.origins import NOWHERE, join_origins
 from postproc.language.analysis.task_machine import (
     MOVES,
-    NOWHERE,
     Arrived,
     Effects,
     TaskMachine,
@@ -108,9 +108,10 @@ class RapidMachine(TaskMachine):
         modes, own = here.modes, self._own_modes()
         for end in (*self.ends, *self.restarts):
             modes = modes.continue_cycle(end.modes, modes.names(), own)
-        found = [here.origins, *(end.origins for end in self.ends)]
-        found += [NOWHERE] if self.restarts else []
-        return self.begin(frozenset().union(*found), modes)
+        origins = here.origins | (NOWHERE if self.restarts else frozenset())
+        for end in self.ends:
+            origins = join_origins(origins, end.origins, self.lost)
+        return self.begin(origins, modes)
 
     def _own_modes(self) -> set[str]:
         """Return the modes that the task sets to other values than it begins with."""

@@ -10,8 +10,6 @@ from postproc.arrays import Floats
 from postproc.files import FolderListing
 from postproc.language import language
 from postproc.language.analysis.task_language import TaskLanguage
-from postproc.language.insert_moves import Splitter
-from postproc.language.measuring_program import MeasuringProgram
 from postproc.language.rapid import backup
 from postproc.language.rapid.clones import RapidCloner
 from postproc.language.rapid.files import RapidFileName
@@ -59,12 +57,6 @@ class Rapid(TaskLanguage):
         """Return True for a module of another task."""
         return bool(RapidFileName(source.name).task_beside)
 
-    def splitter(self, sources: Sequence[Source]) -> Splitter:
-        """Parse the modules of a task to put points on the ways of its moves."""
-        from postproc.language.rapid.insert_moves import RapidSplitter
-
-        return RapidSplitter(self.parse(sources, language.Start()))
-
     def reads(
         self,
         program: Path,
@@ -81,12 +73,6 @@ class Rapid(TaskLanguage):
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""
         return tuple((arm.name, arm.pose) for arm in backup.read_mounted_arms(program))
-
-    def write_measuring(self, program: MeasuringProgram, file: Path) -> str:
-        """Write joint moves that stop, with comments ``MEASURE``."""
-        from postproc.language.rapid.measuring_program import write_rapid
-
-        return write_rapid(program)
 
 
 LANGUAGE = Rapid

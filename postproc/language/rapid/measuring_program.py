@@ -26,7 +26,7 @@ _NO_LOAD = "[0.001,[0,0,0.001],[1,0,0,0],0,0,0]"  # as of tool0: it states nothi
 _OUTSIDE = "[9E9,9E9,9E9,9E9,9E9,9E9]"  # external axes stay where they are
 
 
-def write_rapid(program: MeasuringProgram) -> str:
+def write(program: MeasuringProgram) -> str:
     """Write a module: a tooldata for each probe point, moves and waits in main.
 
     The tool is a local persistent, which no other module or task can mean.

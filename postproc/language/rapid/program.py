@@ -83,7 +83,8 @@ def read_rapid(source: Source) -> RapidFile:
     text = read_statements(source)
     outline = Outline(text, _WORDS)
     odd = text.of_kind(holds_odd)
-    for row in text.of_kind(lambda one: not (_is_called(one) or holds_odd(one))):
+    called = ir.Instruction | CompactIf
+    for row in text.of_kind(lambda s: not (isinstance(s, called) or holds_odd(s))):
         one = text.statement(row)
         if isinstance(one, ModuleHead | RecordHead):
             outline.begin(
@@ -108,11 +109,6 @@ def read_rapid(source: Source) -> RapidFile:
         tuple(sorted({*outline.diagnostics})),
         tuple(outline.of("module")),
     )
-
-
-def _is_called(one: ir.SourceStatement) -> bool:
-    """Return True for an instruction, and for what stands behind a condition."""
-    return isinstance(one, ir.Instruction | CompactIf)
 
 
 def inside(one: ir.SourceStatement) -> ir.SourceStatement:
