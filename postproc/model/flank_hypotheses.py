@@ -36,6 +36,9 @@ class FlankKind(Enum):
     PUSHED = "is pushed by its drive in motion, as all that run on at stops"
     RAN_ON = "ran on at the fast stop where the move begins"
     START = "begins on the other flank"
+    HELD = "is held by friction against more weight"
+    WEIGHED = "gives way to less weight"
+    UNDESCRIBED = "errs as no effect of the model describes"  # of the arm, not a joint
 
 
 _ORDER = (FlankKind.SHARP, FlankKind.ELASTIC, FlankKind.EARLIER, FlankKind.LATER,
@@ -53,6 +56,13 @@ RUNS_ON = 0.06
 Surveys and reversals move slowly, and do not tell. A model of links that rest ahead of
 their drives says so of all stops.
 """
+
+WEIGHS_OTHER = 0.06
+"""Weight of a gear that friction holds against more weight, or less, than was fitted.
+
+The weights of an arm file are estimates.
+"""
+ANOTHER = 1.2  # times what was fitted: so much more, or less
 
 Likelihood = tuple[float, float, float, float, float, float]
 _EQUAL: Likelihood = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)

@@ -11,6 +11,7 @@ from postproc.model.effects import restore
 from postproc.model.effects.base_tilt import BaseTilt
 from postproc.model.effects.bending import BENDING, Bending
 from postproc.model.effects.compliance import SCALE, YIELDING, Compliance
+from postproc.model.effects.held_backlash import HeldBacklash
 from postproc.model.effects.load_backlash import LoadBacklash
 from postproc.model.kinematics import ArmStates
 from tests.calibration.simulator import NJ, random_states
@@ -91,3 +92,21 @@ def test_a_flank_that_weight_chooses_must_show_its_bend() -> None:
     assert replace(straight, form="signed").passes_bend(one_way)
     assert straight not in flank.refine(np.linspace(-1, 2, 9), batch)
     assert all(law.passes_bend(batch) for law in flank.refine(np.arange(3.0), batch))
+
+
+def test_a_gear_rests_where_weight_puts_it_if_friction_does_not_hold_it() -> None:
+    batch = ArmStates(NJ, STATES)
+    torque, side = batch.loads.total[:, 1], STATES.direction[:, 1]
+    held = HeldBacklash((2,), float(np.median(np.abs(torque))))
+    away = np.abs(np.abs(torque) / held.holds - 1.0)
+    clear = away > 0.3
+    beyond = np.abs(torque) > held.holds
+    assert clear[beyond].any() and clear[~beyond].any() and held.shows(batch)
+    b = -1e-4  # of `backlash`
+    turned = b * side + held.angles(batch, np.array([b, b]))[:, 1]
+    wanted = np.where(beyond, b * np.sign(torque), b * side)
+    np.testing.assert_allclose(turned[clear], wanted[clear], atol=2e-2 * abs(b))
+    assert not replace(held, holds=1e3 * held.holds).shows(batch)
+    more = held.hold(1.2)
+    assert more.holds == pytest.approx(1.2 * held.holds)
+    assert LoadBacklash().hold(1.2) is None

@@ -17,6 +17,8 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.compensation.paths.path_states import CHANGED, AlongWays, ErrorAlong
 from postproc.model.flank_hypotheses import (
+    ANOTHER,
+    WEIGHS_OTHER,
     FlankKind,
     FlankOfJoint,
     flanks_of,
@@ -26,6 +28,7 @@ from postproc.robot.pose import lengths
 
 LATE = 0.01  # [m] of the way by which a flank changes later
 AT_ONCE = 0.02  # gaps over which a flank goes that changes as its drive turns back
+MOVED = 1e-6  # [m] of the TCP: less makes no difference
 UNSURE = 1e-3  # of half the play: a side that is known
 
 
@@ -101,7 +104,21 @@ class FlankCases:
                 if kind in together:
                     together[kind][at] += by
         all_of = (self._all_of(kind, by) for kind, by in together.items())
-        return (*found, *chain.from_iterable(all_of))
+        return (*found, *chain.from_iterable(all_of), *self._of_friction())
+
+    def _of_friction(self) -> Iterator[FlankCase]:
+        """Yield the cases of gears that friction holds against other weights."""
+        kinds = (FlankKind.HELD, ANOTHER), (FlankKind.WEIGHED, 1.0 / ANOTHER)
+        others = [
+            (kind, *own) for kind, factor in kinds for own in self.error.hold(factor)
+        ]
+        every, side = np.arange(len(self.off)), self.run.side
+        usual = self.error(self.run, every, side) if others else self.off
+        for kind, joint, error in others:
+            by = error(self.run, every, side) - usual
+            at = np.flatnonzero(lengths(by) > MOVED)
+            if len(at):
+                yield self._case(joint, kind, WEIGHS_OTHER, at, by[at])
 
     def open_sides(self) -> OpenSides:
         """Return the sides of joints by open hypotheses; they take some memory."""
@@ -153,6 +170,10 @@ class FlankCases:
     def predict(self, rows: Ints, side: Floats) -> Floats:
         """Predict the error at samples (k,) with joints on other sides, (k, 3) [m]."""
         return self.error(self.run, rows, side)
+
+    def spread(self, rows: Ints) -> Floats:
+        """Return the covariance of what no effect describes, see `ErrorAlong`."""
+        return self.error.spread(self.run, rows)
 
     def _moves_of(self, joint: int, rows: Ints) -> Floats:
         """Return what the TCP moves from the middle to the upper flank, (k, 3) [m]."""

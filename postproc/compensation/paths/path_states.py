@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,8 +11,10 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows
 from postproc.compensation.paths.path_samples import PathSamples
 from postproc.model.backlash_width import half_widths, on_the_way
+from postproc.model.effect_sum import Combination
 from postproc.model.flank_hypotheses import flanks_of, nominal_widths
 from postproc.model.model import Model
+from postproc.model.variance import covariance_of
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.backlash_operator import PlayOperator
 from postproc.robot.cell import Cell
@@ -157,6 +160,34 @@ class ErrorAlong:
             payload_com=self.cell.payload_com,
         )
         return self.model.error(self.cell.arm, states)
+
+    def hold(self, factor: float) -> Iterator[tuple[int, ErrorAlong]]:
+        """Yield joints (from 1), and the error if friction holds other weights there.
+
+        Args:
+            factor: How much more than what was fitted.
+        """
+        effects = self.model.effects.effects
+        for k, effect in enumerate(effects):
+            other, joint = effect.hold(factor), effect.only_joint()
+            if other is not None and joint is not None:
+                every = Combination((*effects[:k], other, *effects[k + 1 :]))
+                yield joint + 1, replace(self, model=replace(self.model, effects=every))
+
+    def spread(self, run: AlongWays, rows: Ints) -> Floats:
+        """Return the covariance of what no effect describes at samples (k,).
+
+        All joints count together, as the fit found that poses err.
+
+        Returns:
+            (k, 6) [m^2]: xx, yy, zz, then xy, xz, yz.
+        """
+        ways, noise = run.ways, self.model.noise
+        if not (noise.pose_joint or noise.pose):
+            return np.zeros((len(rows), 6))
+        tool = run.cycle.targets.tool[ways.visit[ways.way[rows]], :3, 3]
+        jacobian = self.cell.arm.jacobian(ways.q[rows], tool)[:, :3]
+        return covariance_of(noise.pose_columns(jacobian))
 
 
 def _travel(run: AlongWays) -> Floats:

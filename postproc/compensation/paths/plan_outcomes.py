@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.compensation.expected_error import SIDED
 from postproc.compensation.paths.flank_cases import Key
 from postproc.compensation.paths.path_error import (
     PathAccuracy,
@@ -18,6 +19,7 @@ from postproc.compensation.paths.path_error import (
     largest_in,
 )
 from postproc.compensation.paths.plan_rule import (
+    NEGLIGIBLE,
     PlanOutcome,
     choose_plan,
     choose_plans,
@@ -31,6 +33,12 @@ ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
 ALMOST = 2e-6  # [m] to which what is expected of a plan holds
 LAST = 1.0 - 1e-9  # share of a way that is still on it
+UNDESCRIBED: Key = 0, FlankKind.UNDESCRIBED, 0
+"""That the arm errs as no effect describes, of its joints and poses all together.
+
+How far, any way across the path, is what 5 % of poses err by more to that side: a
+hypothesis that speaks of farther has no weight above `OPEN`.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,7 +58,9 @@ class Objection:
     def __str__(self) -> str:
         """Say it in words."""
         what = "somewhere, even if all joints do as predicted"
-        if self.key is not None:
+        if self.key == UNDESCRIBED:
+            what = f"if the arm {self.key[1].value}"
+        elif self.key is not None:
             what = f"if joint {self.key[0]} {self.key[1].value}"
         return f"it would be worse by {self.worse / MM:.2f} mm {what}"
 
@@ -59,8 +69,12 @@ class Objection:
         """Return what would tell, "" where nothing is open."""
         if self.key is None:
             return ""
+        if self.key == UNDESCRIBED:
+            return NAME_IT
         if self.key[1] is FlankKind.RAN_ON:
             return SLOWER
+        if self.key[1] in (FlankKind.HELD, FlankKind.WEIGHED):
+            return WEIGH.format(joint=self.key[0])
         return MEASURE.format(joint=self.key[0])
 
 
@@ -68,6 +82,11 @@ SLOWER = (
     "Let the JOINT move before it end at 20 % of the speed of the joints or less, or "
     "measure a path (diagnose --path)"
 )
+WEIGH = (
+    "Survey more poses where joint {joint} carries as much weight, or measure a path "
+    "(diagnose --path)"
+)
+NAME_IT = "Look for what the model lacks: diagnose the survey, or survey more poses"
 MEASURE = (
     "Measure how joint {joint} changes its flank: survey.reversals, or diagnose --path"
 )
@@ -156,6 +175,9 @@ def compare(
     for k, key in enumerate(keys, 1):
         own = np.any([ways.has(key) for ways in found], axis=0)
         there[:, k] = own & counts[:, key[0] - 1]
+    reach = np.max([ways.measure_reach() for ways in found], axis=0)
+    if (errs := reach >= NEGLIGIBLE * tolerance).any():
+        keys, there = [*keys, UNDESCRIBED], np.column_stack([there, errs])
     off, worse, share = np.zeros((3, len(plans), *there.shape))
     largest = np.zeros(there.shape)
     for k, hypothesis in enumerate([None, *keys]):
@@ -220,13 +242,23 @@ def _weigh(found: Sequence[_PlannedMoves], keys: Sequence[Key], there: Bools) ->
         there: Where they make a difference, (m, h).
     """
     weights = {key: w for ways in found for key, w in ways.weights.items()}
+    weights[UNDESCRIBED] = 2 * OPEN  # on both sides
+    usually = np.append(1.0 - weights[UNDESCRIBED], found[0].usually)
     weight = np.tile([1.0, *(weights[key] for key in keys)], (len(there), 1))
     for k, key in enumerate(keys, 1):
         own = there[:, k]
-        weight[own, 0] = np.minimum(weight[own, 0], found[0].usually[key[0] - 1])
+        weight[own, 0] = np.minimum(weight[own, 0], usually[key[0]])
     closed = weight[:, 0] <= OPEN  # it is what corrections are made for, and counts
     weight[closed, 0] = np.nextafter(OPEN, 1.0)
     return weight
+
+
+def _times(covariance: Floats, by: Floats) -> Floats:
+    """Multiply covariances (s, 6) with vectors (s, 3), (s, 3)."""
+    (a, b, c, d, e, f), (x, y, z) = covariance.T, by.T
+    return np.stack(
+        [a * x + d * y + e * z, d * x + b * y + f * z, e * x + f * y + c * z], axis=1
+    )
 
 
 class _Difference(NamedTuple):
@@ -254,6 +286,7 @@ class _PlannedMoves:
         across: Distance from the path, (s,) [m].
         first: The samples of way w are first[w] .. first[w + 1] - 1.
         begin: The ways of move k are begin[k] .. begin[k + 1] - 1, (m + 1,).
+        spread: Covariance of what no effect describes, (s, 6) [m^2].
         cases: What hypotheses make of it.
         weights: Of the hypotheses.
         usually: Weight of what is predicted, of every joint, (6,).
@@ -263,6 +296,7 @@ class _PlannedMoves:
     off: Floats
     tangent: Floats
     across: Floats
+    spread: Floats
     first: Ints
     begin: Ints
     cases: Mapping[Key, _Difference]
@@ -280,6 +314,7 @@ class _PlannedMoves:
         first = np.append(0, np.cumsum(count))
         way, across = np.empty((2, first[-1]))
         off, tangent = np.empty((2, first[-1], 3))
+        spread = np.zeros((first[-1], 6))
         told = dict[Key, list[_Difference]]()
         weights, usually = dict[Key, float](), np.ones(6)
         for k in np.unique(number).tolist():
@@ -290,6 +325,7 @@ class _PlannedMoves:
             tangent[here] = paths.tangent.take(there, axis=0)
             if paths.cases is None:
                 continue
+            spread[here] = paths.cases.spread(there)
             usually, place = paths.cases.usually, np.full(len(paths.way), -1)
             place[there] = here
             for key, case in paths.cases.by_key.items():
@@ -302,7 +338,9 @@ class _PlannedMoves:
         for key, some in told.items():
             cases[key] = _Difference(*map(np.concatenate, zip(*some, strict=True)))
         begin = np.cumsum([0, *map(len, moves)])
-        return cls(way, off, tangent, across, first, begin, cases, weights, usually)
+        return cls(
+            way, off, tangent, across, spread, first, begin, cases, weights, usually
+        )
 
     def shift(self, by: Sequence[tuple[Floats, Floats]]) -> _PlannedMoves:
         """Return them with the TCP elsewhere, see `expect_better`."""
@@ -333,6 +371,10 @@ class _PlannedMoves:
         for (joint, _, _), (samples, _, by) in self.cases.items():
             np.maximum.at(out[:, joint - 1], self._moves_at(samples), lengths(by))
         return out
+
+    def measure_reach(self) -> Floats:
+        """Return how far each move may err as no effect describes, (m,) [m]."""
+        return np.asarray(np.maximum.reduceat(self._reach, self._ends[:-1]))
 
     def measure_off(self, key: Key | None, moves: Ints) -> Floats:
         """Return what 95 % of the way of some moves stays within, (k,) [m]."""
@@ -382,16 +424,52 @@ class _PlannedMoves:
         (samples, own, first), (old, there, start) = (
             one._samples_of(ways) for one in (self, usual)
         )
-        before, apart = usual._distances(key)[old], 1.0 + float(usual.way[old].max())
+        apart = 1.0 + float(usual.way[old].max())
         end = usual.way[usual.first[ways + 1] - 1]
         here = np.minimum(self.way[samples], end[own]) + apart * own
-        usually = np.interp(here, usual.way[old] + apart * there, before)
+        there = usual.way[old] + apart * there
+        if key == UNDESCRIBED:
+            beside = usual._beside(old)
+            columns = [np.interp(here, there, column) for column in beside.T]
+            far, usually = self._err_worst(samples, np.stack(columns, axis=1))
+            most = np.maximum.reduceat(usually, first)
+        else:
+            far, before = self._distances(key)[samples], usual._distances(key)[old]
+            usually, most = (
+                np.interp(here, there, before),
+                np.maximum.reduceat(before, start),
+            )
         begins = (self.way[samples] < BEGINS) & leads[own]
-        usually[begins] = np.maximum.reduceat(before, start)[own[begins]]
-        more = self._distances(key)[samples] - usually
+        usually[begins] = most[own[begins]]
+        more = far - usually
         top = largest_in(more, own, first)
         whole = np.maximum(self.way[self.first[ways + 1] - 1], 1e-12)
         return more[top], np.minimum(self.way[samples[top]] / whole, LAST)
+
+    def _err_worst(self, samples: Ints, usual: Floats) -> tuple[Floats, Floats]:
+        """Return distances from the path, here and usually, as the arm may err worst.
+
+        It errs the same in both, from where it usually is towards where it is here.
+
+        Args:
+            samples: Some samples, (k,).
+            usual: Where the TCP usually is there, across the path, (k, 3) [m].
+
+        Returns:
+            (k,) each [m].
+        """
+        beside = self._beside(samples)
+        to = beside - usual
+        to /= np.maximum(lengths(to), 1e-12)[:, None]
+        variance = np.einsum("si,si->s", _times(self.spread[samples], to), to)
+        err = to * (SIDED * np.sqrt(np.maximum(variance, 0.0)))[:, None]
+        return lengths(beside + err), lengths(usual + err)
+
+    def _beside(self, samples: Ints) -> Floats:
+        """Return from the path to the TCP, across it, (k, 3) [m]."""
+        off, tangent = self.off[samples], self.tangent[samples]
+        along = np.einsum("si,si->s", off, tangent)[:, None]
+        return np.asarray(off - along * tangent)
 
     def measure_largest(self, key: Key | None, moves: Ints) -> Floats:
         """Return the largest distance of some moves from their paths, (k,) [m]."""
@@ -406,6 +484,8 @@ class _PlannedMoves:
 
     def _distances(self, key: Key | None) -> Floats:
         """Return the distances from the paths under a hypothesis, (s,) [m]."""
+        if key == UNDESCRIBED:
+            return self.across + self._reach
         if key is None or key not in self.cases:
             return self.across
         out, (samples, across, _) = np.array(self.across), self.cases[key]
@@ -414,6 +494,24 @@ class _PlannedMoves:
 
     def _moves_at(self, samples: Ints) -> Ints:
         return np.searchsorted(self._ends, samples, side="right") - 1
+
+    @cached_property
+    def _reach(self) -> Floats:
+        """How far the arm may err across the path as no effect describes, (s,) [m].
+
+        Along the longest axis of the ellipse that the covariance is across the path.
+        """
+        if not self.spread.any():
+            return np.zeros(len(self.spread))
+        a, b, c, d, e, f = self.spread.T
+        turned = _times(self.spread, self.tangent)
+        along = np.einsum("si,si->s", turned, self.tangent)
+        trace = a + b + c - along
+        square = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f) + along**2
+        square -= 2.0 * np.einsum("si,si->s", turned, turned)
+        apart = square / 2 - (trace / 2) ** 2
+        largest = trace / 2 + np.sqrt(np.maximum(apart, 0.0))
+        return np.asarray(SIDED * np.sqrt(np.maximum(largest, 0.0)))
 
     @cached_property
     def _ends(self) -> Ints:

@@ -31,6 +31,7 @@ PLACES = {
     "scale": "scale.Scale",
     "coupling": "coupling.Coupling",
     "load_backlash": "load_backlash.LoadBacklash",
+    "held_backlash": "held_backlash.HeldBacklash",
     "drive_backlash": "drive.DriveBacklash",
     "drive_transmission": "drive.DriveTransmission",
     "drive_load": "drive.DriveLoad",

@@ -211,6 +211,17 @@ class Effect(ABC):
         """
         return self
 
+    def hold(self, factor: float) -> Effect | None:
+        """Return it with friction that holds gears against more weight.
+
+        Args:
+            factor: How much more.
+
+        Returns:
+            None for what does not begin where weight is more than friction holds.
+        """
+        return None
+
     def has_mean(self) -> bool:
         """Return True if the zero of its joint, fitted without it, holds its mean."""
         return False

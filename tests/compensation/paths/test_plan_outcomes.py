@@ -8,16 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
+from postproc.compensation.expected_error import SIDED
 from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
 from postproc.compensation.paths.plan_outcomes import (
     BEGINS,
+    UNDESCRIBED,
     MoveOutcomes,
+    Objection,
     Predicted,
     expect_better,
 )
 from postproc.compensation.paths.plan_outcomes import compare as compare_moves
-from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint
+from postproc.model.flank_hypotheses import OPEN, FlankKind, FlankOfJoint
+from postproc.model.variance import covariance_of
 from postproc.robot.pose import MM
 
 TOLERANCE = 0.1 * MM
@@ -27,19 +31,25 @@ WAY = np.linspace(0.0, 0.1, 101)  # [m], a sample a millimetre
 class _Known(FlankCases):
     """Cases of one move that were not predicted."""
 
-    def __init__(self, cases: tuple[FlankCase, ...]) -> None:
-        vars(self).update(cases=cases, first=np.array([0, len(WAY)]))
+    def __init__(self, cases: tuple[FlankCase, ...], errs: tuple[float, ...]) -> None:
+        vars(self).update(cases=cases, first=np.array([0, len(WAY)]), errs=errs)
+
+    def spread(self, rows: Ints) -> Floats:
+        """Let joints move the TCP across the path by what they err by [mm]."""
+        columns = np.zeros((len(rows), 3, len(self.errs)))
+        columns[:, 1] = np.array(self.errs) * MM
+        return covariance_of(columns)
 
     @property
     def usually(self) -> Floats:
         return np.full(6, 0.55)
 
 
-def program(off: float, *cases: FlankCase) -> Any:
+def program(off: float, *cases: FlankCase, errs: tuple[float, ...] = ()) -> Any:
     """A program of one move, as far off everywhere."""
-    far = np.full(len(WAY), off * MM)
+    far, ahead = np.full(len(WAY), off * MM), np.tile((1.0, 0.0, 0.0), (len(WAY), 1))
     return SimpleNamespace(
-        way=WAY, cases=_Known(cases), tangent=np.tile((1.0, 0.0, 0.0), (len(WAY), 1)),
+        way=WAY, cases=_Known(cases, errs), tangent=ahead,
         spans_to=lambda v: (np.zeros(len(v), int), np.full(len(v), len(WAY))),
         after=SimpleNamespace(across=far, off=np.outer(far, (0.0, 1.0, 0.0))),
     )  # fmt: skip
@@ -71,6 +81,58 @@ def test_harm_is_counted_place_by_place_and_named() -> None:
     assert found.choice == (0, pytest.approx(0.1 * MM))
     assert found.worst == pytest.approx(0.2 * MM)
     assert found.objection(0) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "cure"),
+    [
+        (FlankKind.HELD, "where joint 3 carries as much weight"),
+        (FlankKind.RAN_ON, "20 % of the speed"),
+        (FlankKind.LATER, "survey.reversals"),
+    ],
+)
+def test_an_objection_names_what_would_tell(kind: FlankKind, cure: str) -> None:
+    assert cure in Objection(1e-4, 0.5, (3, kind, 0)).cure
+
+
+@pytest.mark.parametrize(
+    ("errs", "choice"), [((0.03,), (1, 0.05)), ((0.03, 0.03), (0, 0.15))]
+)
+def test_joints_that_err_together_do_what_none_does_alone(
+    errs: tuple[float, ...], choice: tuple[int, float]
+) -> None:
+    """Of each alone 5 % of poses err by more than 0.049 mm, of both by 0.070 mm."""
+    plans = program(0.06, errs=errs), program(0.0, errs=errs)
+    found = compare(plans, (7,), TOLERANCE)
+    assert found.keys == (UNDESCRIBED,)
+    assert found.choice == (choice[0], pytest.approx(choice[1] * MM))
+    together = SIDED * float(np.hypot.reduce(errs)) * MM
+    assert found.plans[1].off[1] == pytest.approx(together)
+    assert found.worst == pytest.approx(together)
+    usually = abs(0.06 * MM - together)
+    assert found.plans[1].worse[1] == pytest.approx(together - usually)
+    objection = found.objection(1)
+    assert (objection is None) == (len(errs) == 1)
+    if objection is not None:
+        assert "if the arm errs as no effect of the model describes" in str(objection)
+        assert "diagnose" in objection.cure
+
+
+def test_the_arm_may_err_along_the_longest_axis_across_the_path() -> None:
+    columns = np.random.default_rng(1).normal(0.0, 2e-5, (1, 3, 6))
+    spread = np.tile(covariance_of(columns), (len(WAY), 1))
+    plan = program(0.02)
+    vars(plan.cases).update(spread=lambda rows: spread[rows])
+    found = compare((program(0.02), plan), (7,), TOLERANCE)
+    across = (columns[0] @ columns[0].T)[1:, 1:]
+    longest = np.sqrt(np.linalg.eigvalsh(across)[-1])
+    assert found.largest[1] == pytest.approx(0.02 * MM + SIDED * longest)
+
+
+def test_what_the_arm_errs_by_counts_from_a_fifth_of_the_tolerance() -> None:
+    for err, counts in ((0.011, False), (0.013, True)):
+        plans = program(0.1, errs=(err,)), program(0.02, errs=(err,))
+        assert bool(compare(plans, (7,), TOLERANCE).keys) == counts
 
 
 def test_the_deviation_is_that_of_95_percent_of_the_way() -> None:
@@ -109,6 +171,37 @@ def test_points_elsewhere_are_expected_to_move_the_path_evenly() -> None:
     assert not expect_better(told, [(np.array([0.0, 0.4, 1.0]), by)], known)
 
 
+def test_friction_may_hold_a_gear_against_other_weights() -> None:
+    moved = {1.2: np.zeros((5, 3)), 1 / 1.2: np.zeros((5, 3))}
+    moved[1.2][1:3, 1], moved[1 / 1.2][3:, 1] = 3e-5, -4e-5
+
+    def hold(factor: float) -> list[tuple[int, Any]]:
+        return [(2, lambda _, rows, side: moved[factor][rows])]
+
+    error: Any = lambda _, rows, side: np.zeros((len(rows), 3))  # noqa: E731
+    cases = FlankCases(
+        SimpleNamespace(side=np.zeros((5, 6))), _Holds(error, hold), np.zeros((5, 3)),
+        np.tile([1.0, 0.0, 0.0], (5, 1)), np.linspace(0.0, 0.1, 5), np.array([0, 5]),
+    )  # fmt: skip
+    held, weighed = cases._of_friction()
+    assert (held.joint, held.kind) == (2, FlankKind.HELD)
+    assert (weighed.joint, weighed.kind) == (2, FlankKind.WEIGHED)
+    assert held.weight > OPEN and weighed.weight > OPEN
+    np.testing.assert_array_equal(held.rows, [1, 2])
+    np.testing.assert_array_equal(weighed.rows, [3, 4])
+    np.testing.assert_allclose(weighed.across, 4e-5)
+
+
+class _Holds:
+    """An error, and others if friction holds other weights."""
+
+    def __init__(self, error: Any, hold: Any) -> None:
+        self.hold, self._error = hold, error
+
+    def __call__(self, *given: Any) -> Floats:
+        return np.array(self._error(*given))
+
+
 def test_links_that_run_on_at_stops_are_pushed_together_on_the_way() -> None:
     side = np.tile([1.0, -1.0, 1.0, 0.0, 0.0, 0.0], (5, 1))
     by_joint = np.zeros((6, 3))
@@ -116,7 +209,7 @@ def test_links_that_run_on_at_stops_are_pushed_together_on_the_way() -> None:
     run: Any = SimpleNamespace(side=side, least=side, most=side)
     error: Any = lambda _, rows, there: there @ by_joint  # noqa: E731
     cases = FlankCases(
-        run, error, np.zeros((5, 3)),
+        run, _Holds(error, lambda _: []), np.zeros((5, 3)),
         np.tile([1.0, 0.0, 0.0], (5, 1)), np.linspace(0.0, 0.1, 5), np.array([0, 5]),
     )  # fmt: skip
     kinds = [kind for kind in FlankKind if kind is not FlankKind.START]
