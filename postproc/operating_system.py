@@ -46,6 +46,11 @@ def hold_signals(*numbers: signal.Signals) -> Iterator[None]:
 # Processes.
 
 
+def can_fork() -> bool:
+    """Return True if a process with threads may fork: on Linux."""
+    return sys.platform == "linux"
+
+
 def count_cores() -> int:
     """Return the number of cores that this process may run on."""
     if hasattr(os, "sched_getaffinity"):

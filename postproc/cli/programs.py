@@ -70,7 +70,7 @@ CodeOption = Annotated[
         callback=_explain_code,
     ),
 ]
-CROWD = 4  # threads, each with a window of its own in memory
+CROWD = 8  # processes, each with a window of its own in memory
 SHOWN = 20  # targets left alone whose source lines are shown
 
 
@@ -154,7 +154,7 @@ def compensate(
         with stages() as progress:
             outcome = run(
                 files, loaded, fitted, options=options, progress=progress,
-                threads=crowd,
+                processes=crowd,
             )  # fmt: skip
         outcome = outcome.with_tolerance(wanted)
         if strict and outcome.exit_code:

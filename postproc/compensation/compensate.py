@@ -60,7 +60,7 @@ from postproc.compensation.rewrite import (
 )
 from postproc.compensation.sidecar import Sidecar
 from postproc.compensation.targets import report_rounded_points, unknown_blends
-from postproc.compensation.workers import at_once, in_background
+from postproc.compensation.workers import in_worker
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
@@ -88,7 +88,7 @@ def compensate(
     pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = DEFAULT_OPTIONS,
     progress: Progress = no_progress,
-    threads: int = 1,
+    processes: int = 1,
 ) -> Outcome:
     """Move every target of a program against the error the arm would make there.
 
@@ -105,7 +105,7 @@ def compensate(
             are followed and rewritten with it.
         options: What the user asked for.
         progress: Told the name of every stage as it begins.
-        threads: How many may work at once on a long program; the result is the same.
+        processes: How many may work at once on a long program; the result is the same.
 
     Raises:
         ProgramError: The source is no program text, or is compensated already.
@@ -120,7 +120,7 @@ def compensate(
     judged = cell.file.verify.second_opinion
     if judged:
         load()
-    outcome = compensate_files(given, cell, model, options, progress, threads)
+    outcome = compensate_files(given, cell, model, options, progress, processes)
     told = (*outcome.diagnostics, *given.report_omissions(cell))
     outcome = replace(outcome, diagnostics=told, inputs=given.inputs)
     if not judged:
@@ -139,7 +139,7 @@ def compensate_files(
     model: Model,
     options: Options = DEFAULT_OPTIONS,
     progress: Progress = no_progress,
-    threads: int = 1,
+    processes: int = 1,
 ) -> Outcome:
     """Compensate a program that was read, without a second opinion: see `compensate`.
 
@@ -149,7 +149,7 @@ def compensate_files(
     files = given.by_name
     check_preconditions(files, cell, model)
     cell = prepare_cell(cell, model, options)
-    setting = Job(cell, model, options, Clock(progress), threads)
+    setting = Job(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_with_cause(files, cell)
         release_memory(len(reading.visits))
@@ -295,31 +295,34 @@ def _verify(
     return again
 
 
-LONG = 40_000  # visits that are verified in a thread of their own
+LONG = 40_000  # visits that are verified in a process of their own
 
 
 @contextmanager
 def _verify_beside(
     reading: ParsedProgram, kept: WindowResult, output: Output, setting: Job
 ) -> Iterator[None]:
-    """Verify what was written beside other work, in another thread where it is long.
+    """Verify what was written beside other work, in another process where it is long.
 
     Raises:
         VerificationError: The output is not what was meant.
     """
-    clock = Clock(no_progress)
 
-    def verify() -> None:
+    def verify() -> Iterator[dict[str, float]]:
+        clock = Clock(no_progress)
         with clock("verify"):
             _verify(reading, kept, output, setting)
+        yield clock.stages
 
-    beside = setting.threads > 1 and len(reading.visits) >= LONG
-    wait = in_background(verify) if beside else at_once(verify)
-    try:
+    if setting.processes == 1 or len(reading.visits) < LONG:
+        for stages in verify():
+            setting.clock.add(stages)
         yield
-    finally:
-        wait()
-        setting.clock.add(clock.stages)
+        return
+    with in_worker(verify) as found:
+        yield
+        for stages in found:
+            setting.clock.add(stages)
 
 
 def report(

@@ -135,7 +135,7 @@ class Clock:
         self.add({stage: perf_counter() - start})
 
     def add(self, seconds: Mapping[str, float]) -> None:
-        """Add stages that ran elsewhere, such as in another thread."""
+        """Add stages that ran elsewhere, such as in another process."""
         for stage, spent in seconds.items():
             self.stages[stage] = self.stages.get(stage, 0.0) + spent
 
@@ -149,7 +149,7 @@ class Job:
         model: The arm's error.
         options: What the user asked for.
         clock: Times the stages.
-        threads: How many may work at once; the result is the same.
+        processes: How many may work at once; the result is the same.
         averages: Give arrivals that do not agree one correction, if the options say so;
             not while it is asked which of them need points of their own.
     """
@@ -158,7 +158,7 @@ class Job:
     model: Model
     options: Options
     clock: Clock
-    threads: int = 1
+    processes: int = 1
     averages: bool = True
 
     def __post_init__(self) -> None:

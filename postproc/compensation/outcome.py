@@ -128,7 +128,7 @@ class Outcome:
         before, after: Predicted error on the visits that could be compensated. After
             is the residual of the correction: what the arm will miss is `expected`.
         diagnostics: What else was found, in order of line.
-        stages: Seconds spent in every stage, by all threads together.
+        stages: Seconds spent in every stage, by all processes together.
         motion: The largest change on the ways between targets: ``joint_deg``,
             ``elbow_mm``, ``wrist_centre_mm``, ``tcp_mm``.
         position: Where the program wants the TCP at every visit, base frame, (n, 3)

@@ -54,7 +54,7 @@ from postproc.compensation.rewrite import (
 )
 from postproc.compensation.taught_frames import correct_taught
 from postproc.compensation.windowing import Window, cut_points, seams, windows
-from postproc.compensation.workers import in_threads
+from postproc.compensation.workers import in_processes
 from postproc.diagnostics import NO_REASON
 from postproc.language.text.source import Replacements
 from postproc.language.visits import Graph, Visits
@@ -305,10 +305,10 @@ def _in_windows(reading: ParsedProgram, setting: Job) -> WindowResult:
     stops = cut_points(reading.visits)
     quiet = stops if timed else seams(reading.visits)
     work = _WindowWork(reading, setting, quiet, stops)
-    cut = windows(quiet, cuts.share(len(quiet), setting.threads))
+    cut = windows(quiet, cuts.share(len(quiet), setting.processes))
     if len(cut) > 1:
         try:
-            found = in_threads(work, cut, setting.clock, setting.threads)
+            found = in_processes(work, cut, setting.clock, setting.processes)
             parts = [part.kept for part in found]
             found.clear()
             return join_windows(parts)

@@ -160,7 +160,7 @@ def _literals(programs: Sequence[Visits]) -> Literals:
 # a halo on either side. How far things really reach is not guessed: windows must find
 # the same at the targets beside a cut, round by round (see `parallel`).
 
-LEAST = 25_000  # visits of a window; shorter programs are one
+LEAST = 20_000  # visits of a window; shorter programs are one
 HALO = 400  # visits on either side; a round reaches some 20, and LONG ones are long
 BAND = 32  # visits on either side of a cut that both must agree on
 SEAM = 16  # first visits that are settled as the window before has settled them
@@ -246,14 +246,14 @@ def windows(quiet: Bools, least: int) -> list[Window]:
     return [window(quiet, a, b) for a, b in pairwise([*ends, n])]
 
 
-def share(n: int, threads: int) -> int:
-    """Return the visits of a window of n: every thread gets as many windows.
+def share(n: int, processes: int) -> int:
+    """Return the visits of a window of n: every process gets as many windows.
 
-    >>> [share(n, 2) for n in (50_000, 100_000, 1_000_000)]
-    [25000, 25000, 25000]
+    >>> [share(n, 2) for n in (40_000, 100_000, 1_000_000)]
+    [20000, 25000, 20000]
     """
     count = n // LEAST
-    return n // max(count - count % threads, 1)
+    return n // max(count - count % processes, 1)
 
 
 def window(quiet: Bools, first: int, end: int, before: int = -1) -> Window:

@@ -38,7 +38,7 @@ JSON report; the start of Python is not in it. `unbroken` is one fly run without
 `milling` stops every 25,000 points. `parse` resolves too, `plan` holds the inverse
 kinematics, `solve` predicts, `plan again` is every round of corrections. Programs of
 40,000 targets and more are corrected by one process for a core: their stages from
-`plan` to `plan again` are seconds of all threads, which together are more than `all`.
+`plan` to `plan again` are seconds of all processes, which together are more than `all`.
 MiB is the most that all of them hold, shared pages counted once."""
 ABOUT_KERNELS = """toppra by itself solves the same joint angles once, a gridpoint a
 waypoint, and ruckig moves from stop to stop between them. The pipeline calls them only
@@ -48,7 +48,7 @@ ABOUT_LANGUAGES = """One milled job in the words of each language: processor tim
 process, `python -m tests.bench.languages`. Lines of KRL and RAPID are longer."""
 ABOUT_FILES = """The same as one fly run, from files to written output and reports, by a
 process for a core, `python -m tests.bench.languages --files`: seconds as above, and
-processor seconds of all threads."""
+processor seconds of all processes."""
 Row = dict[str, float]
 
 

@@ -6,7 +6,7 @@
 The same moves in the same cell, one process, without cycle times. Languages take
 turns; the fastest round of each counts.
 
-`--files`: from files to written output and reports, by as many threads as there are
+`--files`: from files to written output and reports, by as many processes as there are
 cores. The moves are one fly run; those of 20,000 targets are repeated.
 """
 
@@ -83,7 +83,7 @@ def measure(
     begin = time.process_time()
     done = compensate(
         texts[name], cell, model, options=Options(timing=False), name=name,
-        pages=others, threads=1,
+        pages=others, processes=1,
     )  # fmt: skip
     whole = time.process_time() - begin
     targets = len(program.visits)

@@ -51,7 +51,7 @@ def measure_program(place: Path, cell: Path, model: Path) -> dict[str, float]:
     loaded, fitted = any_controller(load_cell(cell)), load_model(model)
     read = time.perf_counter() - start
     crowd = workers.available()  # as the command line does
-    outcome = compensate(given, loaded, fitted, threads=crowd)
+    outcome = compensate(given, loaded, fitted, processes=crowd)
     pipeline = time.perf_counter() - start
     begin = time.perf_counter()
     out, told = place.with_name(f"out{place.suffix}"), place.with_name("report.json")

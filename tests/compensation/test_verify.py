@@ -121,7 +121,7 @@ def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> No
     assert desk.names() == {"job.pdl"}
 
 
-def test_what_another_thread_finds_wrong_ends_the_run(
+def test_what_another_process_finds_wrong_ends_the_run(
     job_cell: Cell, job_model, monkeypatch
 ) -> None:
     def fail(*_: object) -> None:
@@ -129,11 +129,11 @@ def test_what_another_thread_finds_wrong_ends_the_run(
 
     monkeypatch.setattr(compensation, "LONG", 1)
     job = program(FIRST, POSE)
-    done = compensation.compensate(job, job_cell, job_model, threads=2)
+    done = compensation.compensate(job, job_cell, job_model, processes=2)
     assert "verify" in done.stages
     monkeypatch.setattr(compensation, "check_output", fail)
     with pytest.raises(VerificationError, match="another byte"):
-        compensation.compensate(job, job_cell, job_model, threads=2)
+        compensation.compensate(job, job_cell, job_model, processes=2)
 
 
 def test_what_is_wrong_with_a_text_is_told_before_what_is_wrong_with_visits(

@@ -1,7 +1,7 @@
 """A program that is corrected window by window comes out as if it were corrected whole.
 
 To the byte: output, report and record. Whether cuts lie inside fly runs or at stops,
-what is next to them, and how many threads work on it, makes no difference.
+what is next to them, and how many processes work on it, makes no difference.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import weakref
 import numpy as np
 import pytest
 
-from postproc.compensation import pipeline
+from postproc.compensation import pipeline, workers
 from postproc.compensation import windowing as cuts
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
@@ -31,7 +31,7 @@ FAR = "9000.0000, 0.0000, 0.0000, 0.0000, 180.0000, 0.0000"
 
 @pytest.fixture
 def job(bench_cell, bench_model, monkeypatch):
-    def run(program: made.Made, least: int = LEAST, threads: int = 1) -> Outcome:
+    def run(program: made.Made, least: int = LEAST, processes: int = 1) -> Outcome:
         monkeypatch.setattr(cuts, "LEAST", least)
         return compensate(
             program.source,
@@ -39,7 +39,7 @@ def job(bench_cell, bench_model, monkeypatch):
             bench_model,
             name=program.name,
             variables=program.variables,
-            threads=threads,
+            processes=processes,
         )
 
     for name, value in (("HALO", HALO), ("BAND", BAND), ("RUN_UP", RUN_UP)):
@@ -159,7 +159,7 @@ def test_inside_runs_windows_change_no_byte(job, joined, change) -> None:
     wanted = told(whole)
     for least in (90, 230):
         assert told(job(program, least)) == wanted
-    assert told(job(program, 131, threads=2)) == wanted
+    assert told(job(program, 131, processes=2)) == wanted
     if change not in (leaving, shared):  # one window where things reach so far
         assert min(joined) > 2
 
@@ -171,7 +171,7 @@ def test_between_stops_windows_change_no_byte(job, joined, monkeypatch, kind) ->
     wanted = told(job(program, 10_000))
     for least in (90, 170):
         assert told(job(program, least)) == wanted
-    assert told(job(program, 90, threads=2)) == wanted
+    assert told(job(program, 90, processes=2)) == wanted
     assert min(joined) > 2
 
 
@@ -181,7 +181,14 @@ def test_time_laws_are_found_for_whole_runs(job, monkeypatch, joined) -> None:
     program = made.milling(900)
     wanted = told(job(program, 10_000))
     assert told(job(program, 150)) == wanted and min(joined) > 2
-    assert told(job(program, 150, threads=2)) == wanted
+    assert told(job(program, 150, processes=2)) == wanted
+
+
+def test_threads_do_the_same_where_there_is_no_fork(job, monkeypatch, joined) -> None:
+    monkeypatch.setattr(workers, "can_fork", lambda: False)
+    program = run_of(900, reversing)
+    wanted = told(job(program, 10_000))
+    assert told(job(program, 131, processes=2)) == wanted and min(joined) > 2
 
 
 def test_a_halo_that_is_too_small_is_found_out(job, monkeypatch, joined) -> None:

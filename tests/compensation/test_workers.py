@@ -1,8 +1,11 @@
-"""Several threads do what one would have done."""
+"""Several processes do what one would have done."""
 
 from __future__ import annotations
 
+import os
+import sys
 from dataclasses import dataclass
+from itertools import pairwise
 from threading import Event, get_ident
 
 import numpy as np
@@ -10,9 +13,12 @@ import pytest
 
 from postproc.compensation import workers
 from postproc.compensation.options import Clock, no_progress
-from postproc.compensation.workers import available, in_threads, parts_of
+from postproc.compensation.workers import in_processes, parts_of
 from postproc.exceptions import PostprocError
-from postproc.operating_system import count_cores
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="one process does it where there is no fork"
+)
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Sum:
             if self.breaks_at in window:
                 raise PostprocError(f"{self.breaks_at} from {begin}")
             end = begin + sum(self.numbers[k] for k in window)
-        return Part(window[0], end, get_ident(), begin)
+        return Part(window[0], end, os.getpid(), begin)
 
     def whole(self):
         return [tuple(range(len(self.numbers)))]
@@ -60,29 +66,30 @@ class Sum:
 NUMBERS = (3, 1, 4, 1, 5, 9, 2)
 
 
-def run(work: Sum, threads: int, clock: Clock | None = None) -> list[Part]:
+def run(work: Sum, processes: int, clock: Clock | None = None) -> list[Part]:
     rows = [(k,) for k in range(len(work.numbers))]
-    return in_threads(work, rows, clock or Clock(no_progress), threads)
+    return in_processes(work, rows, clock or Clock(no_progress), processes)
 
 
-@pytest.mark.parametrize("threads", [1, 2, 3, 7, 20])
-def test_results_come_in_order_and_from_others(threads: int) -> None:
-    found = run(Sum(NUMBERS), threads)
+@pytest.mark.parametrize("processes", [1, 2, 3, 7, 20])
+def test_results_come_in_order_and_from_others(processes: int) -> None:
+    found = run(Sum(NUMBERS), processes)
     assert [part.end for part in found] == np.cumsum(NUMBERS).tolist()
-    own, *others = parts_of([part.who for part in found], threads)
-    assert set(own) == {get_ident()}  # an idle thread may take up another part
-    assert all(len(set(part)) == 1 and get_ident() not in part for part in others)
+    workers = [part.who for part in found]
+    assert len(set(workers)) == min(processes, len(NUMBERS))
+    assert workers[0] == os.getpid()
+    assert sum(a != b for a, b in pairwise(workers)) == len(set(workers)) - 1
 
 
 def test_what_was_foretold_wrong_is_done_again() -> None:
     found = run(Sum(NUMBERS, off=1), 3)
     assert [part.end for part in found] == np.cumsum(NUMBERS).tolist()
-    assert {part.who for part in found} == {get_ident()}
+    assert {part.who for part in found} == {os.getpid()}
 
 
 def test_where_two_sides_never_agree_they_become_one_window() -> None:
-    for threads in (1, 3):
-        found = run(Sum(NUMBERS, apart=4), threads)
+    for processes in (1, 3):
+        found = run(Sum(NUMBERS, apart=4), processes)
         assert [part.number for part in found] == [0, 1, 2, 3, 5, 6]
         assert found[-1].end == sum(NUMBERS)
 
@@ -90,18 +97,21 @@ def test_where_two_sides_never_agree_they_become_one_window() -> None:
 @pytest.mark.parametrize("window", range(len(NUMBERS)))
 def test_the_first_failure_is_told_from_where_the_work_really_stood(window) -> None:
     begin = sum(NUMBERS[:window])
-    for threads in (1, 3):
+    for processes in (1, 3):
         with pytest.raises(PostprocError, match=f"{window} from {begin}$"):
-            run(Sum(NUMBERS, breaks_at=window), threads)
+            run(Sum(NUMBERS, breaks_at=window), processes)
 
 
-def test_seconds_of_all_threads_are_added() -> None:
-    clock = Clock(no_progress)
-    run(Sum(NUMBERS), 2, clock)
-    assert set(clock.stages) == {"add"} and clock.stages["add"] > 0
+def test_threads_do_it_where_there_is_no_fork(monkeypatch) -> None:
+    monkeypatch.setattr(workers, "can_fork", lambda: False)
+    monkeypatch.setattr(os, "getpid", get_ident)
+    for numbers in (NUMBERS, NUMBERS[:1]):
+        found = run(Sum(numbers), 3)
+        assert [part.end for part in found] == np.cumsum(numbers).tolist()
+        assert len({part.who for part in found}) == min(3, len(numbers))
 
 
-def test_who_works_ahead_stops_where_the_first_window_fails() -> None:
+def test_threads_stop_where_the_first_window_fails(monkeypatch) -> None:
     begun: list[int] = []
 
     class Slow(Sum):
@@ -116,22 +126,23 @@ def test_who_works_ahead_stops_where_the_first_window_fails() -> None:
                 failed.set()
 
     failed = Event()
+    monkeypatch.setattr(workers, "can_fork", lambda: False)
     with pytest.raises(KeyboardInterrupt):
         run(Slow(NUMBERS), 2)
     assert len(begun) < len(NUMBERS)
 
 
-def test_threads_worth_using(monkeypatch) -> None:
-    assert available() == count_cores()
-    monkeypatch.setattr(workers, "parent_process", object)  # a worker of others
-    assert available() == 1
+def test_seconds_of_all_processes_are_added() -> None:
+    clock = Clock(no_progress)
+    run(Sum(NUMBERS), 2, clock)
+    assert set(clock.stages) == {"add"} and clock.stages["add"] > 0
 
 
 def test_shares_are_all_windows_in_their_order() -> None:
     for n in range(1, 9):
-        for threads in range(1, 11):
-            parts = parts_of(range(n), threads)
+        for processes in range(1, 11):
+            parts = parts_of(range(n), processes)
             assert [k for part in parts for k in part] == list(range(n))
-            assert len(parts) == min(n, threads)
+            assert len(parts) == min(n, processes)
             sizes = [len(part) for part in parts]
             assert max(sizes) - min(sizes) <= 1

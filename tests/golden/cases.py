@@ -56,7 +56,7 @@ def all_cases() -> tuple[Case, ...]:
 
 
 def large() -> Iterator[Case]:
-    """A program long enough to be corrected in windows, by several threads."""
+    """A program long enough to be corrected in windows, by several processes."""
     whole = kept()["programs/milling.pdl"]
     head, begin, rest = whole.partition(b"ROUTINE R_milling\nBEGIN\n")
     body, end, tail = rest.partition(b"END R_milling")
