@@ -113,6 +113,9 @@ class Glimpses:
 NOT_SEEN = Glimpses()
 
 
+SEAM = 16  # first visits of a window, whose states come from the window before
+
+
 @dataclass
 class RoundLog:
     """What was looked at at both ends of a window, round by round.
@@ -120,16 +123,19 @@ class RoundLog:
     Attributes:
         left, right: Visits that are watched.
         begin, end: What was looked at there.
-        seam: The first visits of the window behind.
-        settled: What has become of these when sides were settled, by rounds.
+        settled: States of the visits at the seam when sides were settled, by rounds.
     """
 
     left: slice = field(default_factory=lambda: slice(0, 0))
     right: slice = field(default_factory=lambda: slice(0, 0))
     begin: Glimpses = NOT_SEEN
     end: Glimpses = NOT_SEEN
-    seam: slice = field(default_factory=lambda: slice(0, 0))
     settled: dict[int, Floats] = field(default_factory=dict)
+
+    @property
+    def seam(self) -> slice:
+        """Return the first visits of the next window."""
+        return slice(self.right.start, min(self.right.start + SEAM, self.right.stop))
 
     def see(self, turn: int | None, seen: Snapshot) -> None:
         """Keep what is watched of a look at all visits."""

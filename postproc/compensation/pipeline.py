@@ -427,8 +427,7 @@ class _WindowWork:
         if own.first == 0:
             left = slice(0, 0)
         right = own.rows(self._after(own), min(own.end + cuts.BAND, own.stop))
-        seam = slice(right.start, min(right.start + cuts.SEAM, right.stop))
-        return RoundLog(left, right, seam=seam)
+        return RoundLog(left, right)
 
     def whole(self) -> list[Window]:
         """Return the program as one window."""

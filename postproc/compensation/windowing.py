@@ -163,7 +163,6 @@ def _literals(programs: Sequence[Visits]) -> Literals:
 LEAST = 20_000  # visits of a window; shorter programs are one
 HALO = 400  # visits on either side; a round reaches some 20, and LONG ones are long
 BAND = 32  # visits on either side of a cut that both must agree on
-SEAM = 16  # first visits that are settled as the window before has settled them
 RUN_UP = 2_000  # visits that tell how the arm comes to a window
 STEPS = (
     Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME, Meaning.AWAY,
