@@ -35,10 +35,13 @@ fn mixed(rows: &[Six; 6], q: &Six) -> Six {
 impl Solver {
     /// Name the branch of joint angles; of those that are not known too, see `branch`.
     pub fn slot(&self, q: &Six) -> i64 {
-        let known = q.map(|angle| if angle.is_nan() { 0.0 } else { angle });
+        self.bits(&q.map(|angle| if angle.is_nan() { 0.0 } else { angle }))
+    }
+
+    fn bits(&self, q: &Six) -> i64 {
         match &self.0 {
-            Form::Closed(form) => form.arm.slot(&mixed(&form.mix, &known)),
-            Form::Numeric(numeric) => numeric.slot(&known) as i64,
+            Form::Closed(form) => form.arm.slot(&mixed(&form.mix, q)),
+            Form::Numeric(numeric) => numeric.slot(q) as i64,
         }
     }
 
@@ -87,10 +90,7 @@ impl Solver {
         q: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let q = rows::<6>(&q)?;
-        let one = |i: usize| match &self.0 {
-            Form::Closed(form) => form.arm.slot(&mixed(&form.mix, &q[i])),
-            Form::Numeric(numeric) => numeric.slot(&q[i]) as i64,
-        };
+        let one = |i: usize| self.bits(&q[i]);
         Ok(in_parts(py, q.len(), WORTH, |some| some.map(one).collect())?.into_pyarray(py))
     }
 
