@@ -21,6 +21,7 @@ from scipy.special import gammaincinv, ndtr, ndtri
 from postproc.arrays import Bools, Floats, Indices, chunks, map_chunks
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.model.model import CHUNK
+from postproc.model.variance import covariance_times
 from postproc.operating_system import count_cores
 
 BOUND = 0.95  # of the length of an error
@@ -60,9 +61,9 @@ class LengthLaw:
             covariance: (n, 6) [m^2]: xx, yy, zz, then xy, xz, yz.
         """
         square = np.square(mean).sum(axis=1)
-        x, y, z = mean.T
-        a, b, c, d, e, f = _floor(covariance, square).T
-        turned = (a * x + d * y + e * z, d * x + b * y + f * z, e * x + f * y + c * z)
+        covariance = _floor(covariance, square)
+        a, b, c, d, e, f = covariance.T
+        (x, y, z), turned = mean.T, covariance_times(covariance, mean).T
         along = np.maximum(x * turned[0] + y * turned[1] + z * turned[2], 0.0)
         first = a + b + c + square
         second = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f + along)

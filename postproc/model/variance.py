@@ -24,6 +24,17 @@ def covariance_of(parts: Floats) -> Floats:
     return out
 
 
+def covariance_times(covariance: Floats, vectors: Floats) -> Floats:
+    """Multiply covariances (n, 6) with vectors (n, 3): (n, 3).
+
+    >>> covariance_times(np.array([[1.0, 2, 3, 4, 5, 6]]), np.array([[1.0, 0, 0]]))
+    array([[1., 4., 5.]])
+    """
+    (a, b, c, d, e, f), (x, y, z) = covariance.T, vectors.T
+    turned = a * x + d * y + e * z, d * x + b * y + f * z, e * x + f * y + c * z
+    return np.stack(turned, axis=1)
+
+
 def spread_covariance(columns: Floats, covariance: Floats) -> Floats:
     """Return the covariance of columns times uncertain factors, (n, 6).
 

@@ -27,6 +27,7 @@ from postproc.compensation.paths.plan_rule import (
     tolerable_harm,
 )
 from postproc.model.flank_hypotheses import OPEN, FlankKind
+from postproc.model.variance import covariance_times
 from postproc.robot.pose import MM, lengths
 
 ALONG = 0.95  # of a way: what the deviation of a plan is taken of
@@ -253,14 +254,6 @@ def _weigh(found: Sequence[_PlannedMoves], keys: Sequence[Key], there: Bools) ->
     return weight
 
 
-def _times(covariance: Floats, by: Floats) -> Floats:
-    """Multiply covariances (s, 6) with vectors (s, 3), (s, 3)."""
-    (a, b, c, d, e, f), (x, y, z) = covariance.T, by.T
-    return np.stack(
-        [a * x + d * y + e * z, d * x + b * y + f * z, e * x + f * y + c * z], axis=1
-    )
-
-
 class _Difference(NamedTuple):
     """What a hypothesis makes of some ways, k samples.
 
@@ -461,7 +454,7 @@ class _PlannedMoves:
         beside = self._beside(samples)
         to = beside - usual
         to /= np.maximum(lengths(to), 1e-12)[:, None]
-        variance = np.einsum("si,si->s", _times(self.spread[samples], to), to)
+        variance = np.einsum("si,si->s", covariance_times(self.spread[samples], to), to)
         err = to * (SIDED * np.sqrt(np.maximum(variance, 0.0)))[:, None]
         return lengths(beside + err), lengths(usual + err)
 
@@ -504,7 +497,7 @@ class _PlannedMoves:
         if not self.spread.any():
             return np.zeros(len(self.spread))
         a, b, c, d, e, f = self.spread.T
-        turned = _times(self.spread, self.tangent)
+        turned = covariance_times(self.spread, self.tangent)
         along = np.einsum("si,si->s", turned, self.tangent)
         trace = a + b + c - along
         square = a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f) + along**2
