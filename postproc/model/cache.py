@@ -1,4 +1,4 @@
-"""What was made of a few objects, kept while these are in use."""
+"""Results for the last few arms, computed once for each."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Generic, TypeVar
 from postproc.robot.arm import Arm
 
 T = TypeVar("T")
-KEPT = 8  # arms; a service that loads more of them makes things anew
+KEPT = 8  # arms; for more of them results are computed again
 
 
 class ArmCache(Generic[T]):
-    """What was made of the last few arms, each told from others by its identity."""
+    """Results for the last few arms; an arm is recognised by its identity."""
 
     def __init__(self) -> None:
         """Begin with none."""
         self._made: dict[int, tuple[Arm, T]] = {}
 
     def of(self, arm: Arm, make: Callable[[Arm], T]) -> T:
-        """Return what was made of an arm, or make it."""
+        """Return the result for an arm; compute it the first time."""
         found = self._made.get(id(arm))
         if found is None:
             found = self._made[id(arm)] = arm, make(arm)

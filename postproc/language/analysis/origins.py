@@ -10,7 +10,7 @@ from postproc.language.visits import ELSEWHERE
 Origins = frozenset[int]
 """Visits, by number; START, ELSEWHERE, or MANY."""
 
-MANY = -3  # one of so many visits that they are not told apart
+MANY = -3  # one of so many visits that they are not distinguished
 MOST_ORIGINS = 500
 NOWHERE = frozenset([ELSEWHERE])
 TOLD_TOGETHER = (
@@ -22,8 +22,8 @@ TOLD_TOGETHER = (
 def join_origins(mine: Origins, theirs: Origins, lost: set[int]) -> Origins:
     """Return where the arm may come from on either way; the first set if that is all.
 
-    The sizes of all sets of a program together stay linear in the program. Visits
-    that are not told apart do not know what comes behind them.
+    The sizes of all sets of a program together stay linear in the program. Behind
+    visits that are not distinguished, the arm may go anywhere.
 
     Args:
         mine: The origins on one way.
@@ -49,7 +49,7 @@ def number_origins(origins: Origins, visit: Sequence[int] | Indices) -> list[int
     """Return the places of origins among all visits, ascending.
 
     Args:
-        origins: The origins; those that are not told apart are ELSEWHERE.
+        origins: The origins; those not distinguished are ELSEWHERE.
         visit: The place of each visit.
     """
     if MANY in origins:

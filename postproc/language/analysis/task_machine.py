@@ -656,7 +656,7 @@ class TaskMachine(Interpreter[Arrived]):
         self.paused |= here.origins
 
     def list_visits(self, origins: Origins) -> set[int]:
-        """Return visits; of those that are not told apart all that there may be."""
+        """Return visits; of those not distinguished, all that there may be."""
         every = origins | self.lost if MANY in origins else origins
         return {k for k in every if k >= 0}
 
