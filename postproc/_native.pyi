@@ -15,6 +15,8 @@ from postproc.arrays import Bools, Bytes, Cells, Floats, Indices, Ints
 
 SOURCES: str
 """Hash of the sources that it was built from."""
+STRAIGHT: float
+"""At axis 5, below this the two branches of the wrist are one [rad]."""
 TOGETHER: int
 """Numbers whose places are told from that of the first of them."""
 
@@ -113,8 +115,22 @@ def torque(
 
 # deviation.rs: how far the arm is led from where it was (`postproc.motion.deviation`)
 def departure(
-    parameters: Floats, angles: tuple[Floats, Floats], point: Floats, offset: Floats
-) -> tuple[Floats, Floats]: ...
+    parameters: Floats,
+    solver: Solver,
+    angles: tuple[Floats, Floats],
+    point: Floats,
+    offset: Floats,
+) -> tuple[Floats, Floats, Bools]: ...
+def departure_along(
+    parameters: Floats,
+    solver: Solver,
+    ways: tuple[tuple[_Edges, Floats], tuple[_Edges, Floats]],
+    first: Ints,
+    parts: Ints,
+    branched: Bools,
+    point: Floats,
+    offset: Floats,
+) -> tuple[Floats, Floats, Bools]: ...
 
 # shares.rs: what shares of ways stay within (`compensation.paths.plan_outcomes`)
 def stays_within(
@@ -132,9 +148,6 @@ def on_other_turns(q: Floats, turns: Floats) -> Bools: ...
 
 # numeric.rs: the inverse kinematics of any chain (`postproc.robot.inverse`)
 def numeric_branches(parameters: Floats, flange: Floats) -> Floats: ...
-
-# edges.rs: places on paths of joints (`postproc.motion.deviation`)
-def along_edges(edges: _Edges, q: Floats, edge: Ints, share: Floats) -> Floats: ...
 
 # pose.rs: rigid transforms (`postproc.robot.pose`)
 def inverse(given: Floats) -> Floats: ...

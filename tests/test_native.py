@@ -141,13 +141,77 @@ def test_how_far_joint_angles_lead_from_others(chain, random, laid_out):
     offset = np.array([1e-3, -1e-3, 0, 5e-4, 0, -2e-3])
     old, new, points = laid_out(old), laid_out(new), laid_out(points)
     given = (floats(old), floats(new)), floats(points), offset
-    found = _native.departure(chain.pack(), *given)
+    arm = chain.pack(), _native.Solver.of_chain(chain.pack())
+    *found, branch = _native.departure(*arm, *given)
+    slots = np.array([arm[1].slots(floats(q)) for q in (old, new)])
+    known = ~np.isnan(old + new).any(axis=1)
+    assert np.array_equal(branch, _differ(slots, old, new) & known)
+    assert branch.any() or len(branch) < 100
     few = np.r_[:20, max(len(old) - 20, 0) : len(old)] if len(old) > 40 else slice(None)
     plain = kinematics.departure(chain, old[few], new[few], points[few], offset)
     for seen, meant in zip(found, plain, strict=True):
         assert np.allclose(seen[few], meant, **CLOSE)
     with pytest.raises(ValueError, match="columns of"):
-        _native.departure(chain.pack(), given[0], np.ones((2, 3)), offset)
+        _native.departure(*arm, given[0], np.ones((2, 3)), offset)
+
+
+def _differ(slots, old, new):
+    """Tell which branches differ; a wrist that is straight within 1 mrad is on both."""
+    both = np.abs(np.minimum(old[:, 4] * new[:, 4], 0.0)) < 1e-6
+    return (np.bitwise_xor(*slots) & ~np.where(both, 4, 0)) != 0
+
+
+def test_how_far_ways_lead_from_others(chain, random):
+    """The largest at places inside, by interpolation between samples."""
+    first = np.array([0, 0, 1, 2, 4, 5])  # one visit from two others
+    source = np.array([0, 1, 1, 2, 3])
+    count = np.array([3, 1, 4, 2, 6])
+    parts = np.array([3, 4, 4, 2, 6])
+    start = np.append(0, np.cumsum(count))
+    q = random.uniform(-1, 1, (5, 6)) + np.array([0, 0, 0, 0, 1.5, 0])
+    path = random.uniform(-1, 1, (start[-1], 6)) + np.array([0, 0, 0, 0, 1.5, 0])
+    moved = random.normal(0, 0.3, path.shape)
+    old = Edges(first, source, path, start)
+    new = Edges(first, np.array([0, 1, 1, -1, 3]), path + moved, start)
+    tool, offset = random.normal(size=(5, 3)), random.normal(0, 1e-3, 6)
+    arm = chain.pack(), _native.Solver.of_chain(chain.pack())
+    branched = np.array([True, True, False, True, True])
+    found = _native.departure_along(
+        *arm, ((old, q), (new, q + 0.01)), first, parts, branched, tool, offset
+    )
+    for visit in range(5):
+        places = []
+        for edge in range(first[visit], first[visit + 1]):
+            if new.source[edge] != source[edge]:
+                continue
+            for share in np.arange(1, parts[edge]) / parts[edge]:
+                both = [
+                    _along(e, at, edge, share) for e, at in ((old, q), (new, q + 0.01))
+                ]
+                places.append(both)
+        if not places:
+            assert np.isnan(found[0][visit]).all() and not found[2][visit]
+            continue
+        a, b = np.array(places).swapaxes(0, 1)
+        point = np.tile(tool[visit], (len(a), 1))
+        joints, sizes = kinematics.departure(chain, a, b, point, offset)
+        assert np.allclose(found[0][visit], joints.max(axis=0), **CLOSE)
+        assert np.allclose(found[1][visit], sizes.max(axis=0), **CLOSE)
+        slots = np.array([arm[1].slots(floats(x)) for x in (a, b)])
+        meant = _differ(slots, a, b).any() and branched[visit]
+        assert found[2][visit] == meant
+    with pytest.raises(IndexError, match="edges that are not there"):
+        _native.departure_along(
+            *arm, ((old, q), (new, q)), first + 1, parts, branched, tool, offset
+        )
+
+
+def _along(edges, q, edge, share):
+    """Interpolate between the samples of an edge."""
+    samples = edges.path[edges.start[edge] : edges.start[edge + 1]]
+    all_of_it = np.vstack([q[edges.source[edge]], samples])
+    at = np.linspace(0, 1, len(all_of_it))
+    return [np.interp(share, at, column) for column in all_of_it.T]
 
 
 def test_what_a_share_of_ways_stays_within(random):

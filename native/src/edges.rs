@@ -1,10 +1,10 @@
-//! Places on the sampled paths of edges: `postproc.motion.blending`.
+//! Places on the sampled paths of edges, for corners and deviations.
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, each, flat, rows, same_length, Six};
+use crate::rows::{flat, rows, Six};
 
 /// `Edges` of the package.
 #[derive(FromPyObject)]
@@ -44,6 +44,11 @@ impl<'a> Paths<'a> {
         self.source.len()
     }
 
+    /// Return where an edge comes from, negative where that is not known.
+    pub fn source(&self, edge: usize) -> i64 {
+        self.source[edge]
+    }
+
     /// Return the joint angles at a visit.
     pub fn visit(&self, visit: i64) -> PyResult<&'a Six> {
         let found = usize::try_from(visit).ok().and_then(|v| self.q.get(v));
@@ -52,8 +57,8 @@ impl<'a> Paths<'a> {
 
     /// Return an edge with its samples.
     pub fn way(&self, edge: i64) -> PyResult<Way<'a>> {
-        self.find(edge)
-            .ok_or_else(|| PyIndexError::new_err(format!("edge {edge} leads from nowhere known")))
+        let found = usize::try_from(edge).ok().and_then(|edge| self.find(edge));
+        found.ok_or_else(|| PyIndexError::new_err(format!("edge {edge} leads from nowhere known")))
     }
 
     /// Tell where the samples of an edge stand.
@@ -70,8 +75,8 @@ impl<'a> Paths<'a> {
         self.path.get(span).ok_or_else(|| PyIndexError::new_err("samples that are not there"))
     }
 
-    fn find(&self, edge: i64) -> Option<Way<'a>> {
-        let edge = usize::try_from(edge).ok()?;
+    /// Return an edge with its samples; None where it leads from nowhere known.
+    pub fn find(&self, edge: usize) -> Option<Way<'a>> {
         let samples = self.path.get(self.span(edge).ok()?).filter(|s| !s.is_empty())?;
         let source = usize::try_from(*self.source.get(edge)?).ok()?;
         Some(Way { from: self.q.get(source)?, samples })
@@ -116,22 +121,4 @@ impl Way<'_> {
             here[j] + t * slope + t * t / 2.0 * bend
         })
     }
-}
-
-/// Interpolate joint angles at fractions (k,) < 1 of edges (k,): (k, 6) [rad].
-///
-/// Args: the edges; joint angles at the visits, (n, 6) [rad]; the edges asked for, which
-/// come from known visits.
-#[pyfunction]
-pub fn along_edges<'py>(
-    py: Python<'py>,
-    edges: Edges<'py>,
-    q: PyReadonlyArray2<'py, f64>,
-    edge: PyReadonlyArray1<'py, i64>,
-    share: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (paths, edge, share) = (Paths::of(&edges, &q)?, flat(&edge)?, flat(&share)?);
-    let n = same_length(&[edge.len(), share.len()])?;
-    let found = each(py, n, |i| paths.way(edge[i]).map(|way| way.straight_at(share[i])))?;
-    Ok(array(py, found.into_iter().collect::<PyResult<_>>()?))
 }

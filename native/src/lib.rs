@@ -57,6 +57,7 @@ const SOURCES: &str = env!("SOURCES");
 #[pymodule(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("SOURCES", SOURCES)?;
+    module.add("STRAIGHT", deviation::STRAIGHT)?;
     module.add("TOGETHER", spans::TOGETHER)?;
     module.add_class::<model::Core>()?;
     module.add_class::<names::NameColumn>()?;
@@ -79,7 +80,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
     module.add_function(wrap_pyfunction!(numeric::numeric_branches, module)?)?;
-    module.add_function(wrap_pyfunction!(edges::along_edges, module)?)?;
     module.add_function(wrap_pyfunction!(play::reversals, module)?)?;
     module.add_function(wrap_pyfunction!(play::sides_along, module)?)?;
     module.add_function(wrap_pyfunction!(direction::states, module)?)?;
@@ -93,6 +93,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(terms::turned, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(deviation::departure, module)?)?;
+    module.add_function(wrap_pyfunction!(deviation::departure_along, module)?)?;
     module.add_function(wrap_pyfunction!(shares::stays_within, module)?)?;
     module.add_function(wrap_pyfunction!(design::gram, module)?)?;
     module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;

@@ -536,7 +536,7 @@ def _read_back(
         job, plan = iteration.setting, iteration.planned.plan
         arm, tool, offset = job.cell.arm, plan.tool[:, :3, 3], job.offset
         move, q = last.targets.move, last.exact.q
-        moved = path_departure(arm, move, tool, plan.exact, q, last.follow, offset)
+        moved = path_departure(arm, move, tool, plan.exact, q, last.edges.join, offset)
     return Converged(proposal, edits, last.reached, moved), flipped
 
 

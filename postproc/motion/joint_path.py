@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc import _native
 from postproc.arrays import (
     Bools,
     Floats,
@@ -81,7 +82,6 @@ NO_PATH = np.empty((0, 6))
 
 # The arrays that a trace fills in program order.
 
-STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 PARTIAL = (TargetKind.PARTIAL_POSE, TargetKind.PARTIAL_JOINTS)
 STEPS = (
     TargetKind.TOOL_STEP, TargetKind.BASE_STEP, TargetKind.JOINT_STEP,
@@ -285,7 +285,7 @@ class PathSolver:
 
     def branches_at(self, rows: Ints) -> Ints:
         """Return the branches at targets, (k,), likewise."""
-        straight = np.abs(self.q[rows, 4]) < STRAIGHT
+        straight = np.abs(self.q[rows, 4]) < _native.STRAIGHT
         return np.where(straight, -1, self.slot[rows])
 
     def span(self, edge: int) -> slice:

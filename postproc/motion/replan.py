@@ -12,7 +12,7 @@ from postproc.motion.joint_path import NOWHERE, FixedTargets, StartState, Trace,
 from postproc.motion.spline_moves import sides_on_curves
 from postproc.motion.targets import TargetKind, Targets
 from postproc.robot.arm import Arm
-from postproc.robot.backlash_operator import PlayOperator
+from postproc.robot.backlash_operator import Edges, PlayOperator
 from postproc.robot.direction import NO_SIDES, FlankState, Passages, passages, sides
 
 # Where moved targets lead the arm: joint angles and sides, without a time law.
@@ -49,6 +49,38 @@ class PlannedPoints:
 
 
 @dataclass(frozen=True)
+class PatchedEdges:
+    """The paths to all targets, as if the arm stopped at each.
+
+    Attributes:
+        edges: As they were when all were traced.
+        changes: What has replaced some of them since, the latest last.
+    """
+
+    edges: Edges
+    changes: tuple[ChangedEdges, ...] = ()
+
+    def with_(self, change: ChangedEdges) -> PatchedEdges:
+        """Return them with some edges replaced."""
+        return PatchedEdges(self.edges, (*self.changes, change))
+
+    def join(self) -> Edges:
+        """Return all edges as they are now."""
+        edges, paths = self.edges, [self.edges.path]
+        source, begin = edges.source, np.array(edges.start[:-1])
+        count, size = np.diff(edges.start), len(edges.path)
+        for change in self.changes:
+            source = change.splice_sources(source, change.edges.source)
+            start = change.edges.start
+            begin[change.edge] = size + start[change.new]
+            count[change.edge] = np.diff(start)[change.new]
+            paths.append(change.edges.path)
+            size += len(change.edges.path)
+        path = np.concatenate(paths)[spans(begin, count)]
+        return Edges(edges.first, source, path, np.append(0, np.cumsum(count)))
+
+
+@dataclass(frozen=True)
 class Replanned:
     """The way through n targets, with what it takes to look at parts of it again.
 
@@ -63,9 +95,8 @@ class Replanned:
         slot: Branch taken, (n,), -1 where it was not looked up.
         passages: What the rounded paths between do to the joints' play.
         sides: On which sides the joints arrive.
+        edges: The paths to the targets, as if the arm stopped at each.
         begin: Where the arm stands at the first target, if that is known beforehand.
-        traced: The way as if the arm stopped at each target; None where only parts of
-            it are new.
     """
 
     arm: Arm
@@ -77,8 +108,8 @@ class Replanned:
     slot: Ints
     passages: Passages
     sides: FlankState
+    edges: PatchedEdges
     begin: StartState = NOWHERE
-    traced: Trace | None = None
 
     @property
     def side(self) -> Floats:
@@ -91,10 +122,6 @@ class Replanned:
         tool, flange = self.targets.tool[:, :3, 3], self.exact.flange
         turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
         return turned + flange[:, :3, 3]
-
-    def follow(self) -> Trace:
-        """Return the way as if the arm stopped at every target."""
-        return self.traced or trace(self.arm, self.targets, self.begin.known)
 
     @property
     def reached(self) -> Reached:
@@ -124,7 +151,7 @@ def replan_all(
     found = sides_on_curves(arm, targets, traced.q, found)
     return Replanned(
         arm, targets, points_of_plan(exact), traced.q, traced.aside, traced.rounded,
-        exact.slot, ways, found, begin, exact,
+        exact.slot, ways, found, PatchedEdges(exact.edges), begin,
     )  # fmt: skip
 
 
@@ -234,13 +261,14 @@ def replan(
         _patch_rows(before.exact.flange, part, exact.flange),
     )
     now = passages(arm, traced.q, traced.driven)
-    ways = _splice_edges(before.passages, part, now)
+    changed = ChangedEdges.of(before.passages.first, part, exact.edges)
+    ways = changed.splice(before.passages, now)
     found = sides_on_curves(arm, targets, passed, sides(arm, passed, ways, lead))
     aside = _patch_rows(before.aside, part, traced.aside)
     corners = _patch_rows(before.rounded, part, traced.rounded)
     return Replanned(
         arm, targets, at_targets, passed, aside, corners, slot, ways, found,
-        before.begin,
+        before.edges.with_(changed), before.begin,
     )  # fmt: skip
 
 
@@ -313,18 +341,50 @@ def _patch_rows(before: Floats, part: _Part, now: Floats) -> Floats:
     return out
 
 
-def _splice_edges(before: Passages, part: _Part, now: Passages) -> Passages:
-    """Put new edges in: those between targets whose passing may change."""
-    last_kept = np.append(False, part.kept[:-1]) & ~part.seeds
-    alone = part.targets.from_nowhere
-    rows = np.flatnonzero(part.kept & ~part.seeds & (last_kept | alone))
-    edge = _edges_of(before.first, part.rows[rows])
-    new = _edges_of(now.first, rows)
-    source, found = np.array(before.source), now.source[new]
-    source[edge] = np.where(found >= 0, part.rows[np.maximum(found, 0)], found)
-    lo, hi = np.array(before.clamps.lo), np.array(before.clamps.hi)
-    lo[edge], hi[edge] = now.clamps.lo[new], now.clamps.hi[new]
-    return Passages(before.first, source, PlayOperator(lo, hi))
+@dataclass(frozen=True)
+class ChangedEdges:
+    """k edges that some stretches of a program replace.
+
+    Attributes:
+        edge: Which they are in the program, (k,).
+        new: .. and among the edges of the stretches, (k,).
+        rows: The targets of the stretches in the program, (m,).
+        edges: The edges of the stretches, as if the arm stopped at every target.
+    """
+
+    edge: Ints
+    new: Ints
+    rows: Ints
+    edges: Edges
+
+    @classmethod
+    def of(cls, first: Ints, part: _Part, edges: Edges) -> ChangedEdges:
+        """Take the edges between targets whose passing may change.
+
+        Args:
+            first: Edges to the targets of the program, see `Edges`.
+            part: The stretches.
+            edges: Their edges.
+        """
+        last_kept = np.append(False, part.kept[:-1]) & ~part.seeds
+        alone = part.targets.from_nowhere
+        rows = np.flatnonzero(part.kept & ~part.seeds & (last_kept | alone))
+        new = _edges_of(edges.first, rows)
+        return cls(_edges_of(first, part.rows[rows]), new, part.rows, edges)
+
+    def splice(self, before: Passages, now: Passages) -> Passages:
+        """Put in what passing the new edges does to plays."""
+        lo, hi = np.array(before.clamps.lo), np.array(before.clamps.hi)
+        lo[self.edge] = now.clamps.lo[self.new]
+        hi[self.edge] = now.clamps.hi[self.new]
+        source = self.splice_sources(before.source, now.source)
+        return Passages(before.first, source, PlayOperator(lo, hi))
+
+    def splice_sources(self, before: Ints, now: Ints) -> Ints:
+        """Put in where the new edges come from, negative where that is not known."""
+        source, found = np.array(before), now[self.new]
+        source[self.edge] = np.where(found >= 0, self.rows[np.maximum(found, 0)], found)
+        return source
 
 
 def _edges_of(first: Ints, rows: Ints) -> Ints:

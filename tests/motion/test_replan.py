@@ -72,7 +72,11 @@ def assert_same(found: Replanned, wanted: Replanned) -> None:
             getattr(found.passages, name), getattr(wanted.passages, name), name
         )
     np.testing.assert_array_equal(found.slot, wanted.slot)
+    edges, meant = found.edges.join(), wanted.edges.join()
+    for name in ("first", "source", "start"):
+        np.testing.assert_array_equal(getattr(edges, name), getattr(meant, name), name)
     for a, b in (
+        (edges.path, meant.path),
         (found.passages.clamps.lo, wanted.passages.clamps.lo),
         (found.passages.clamps.hi, wanted.passages.clamps.hi),
         (found.exact.q, wanted.exact.q),
