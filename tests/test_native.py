@@ -567,6 +567,9 @@ def test_words_are_found_in_letters_of_any_size():
         b"x" * 99,
     ):
         assert _native.holds(text, word) == (word.upper() in text.upper())
+    for place in range(150):  # they are looked for in many places at once
+        assert _native.holds(b"-" * place + b"TaughT" + b"-" * 140, b"taught")
+        assert not _native.holds(b"-" * place + b"TaugXT" + b"-" * 140, b"taught")
     assert not _native.holds(b"", b"measure")
     with pytest.raises(ValueError, match="empty"):
         _native.holds(text, b"")

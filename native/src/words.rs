@@ -4,7 +4,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::rows::detached;
+use crate::rows::{at_best, detached};
 
 /// Lines that are looked at between two looks at signals.
 const AT_ONCE: usize = 1 << 20;
@@ -46,8 +46,9 @@ fn begins(line: &[u8], words: &[Vec<u8>]) -> bool {
     words.iter().any(|word| begin(word).is_some_and(|b| b.eq_ignore_ascii_case(word)))
 }
 
-/// Bytes that are looked at between two looks at signals.
+/// Bytes that are looked at between two looks at signals, and side by side.
 const BYTES: usize = 1 << 26;
+const SIDE: usize = 64;
 
 /// Tell whether a text holds a word.
 ///
@@ -56,20 +57,34 @@ const BYTES: usize = 1 << 26;
 #[pyfunction]
 pub fn holds(py: Python<'_>, data: &Bound<'_, PyBytes>, word: &[u8]) -> PyResult<bool> {
     let text = data.as_bytes();
-    let &[small, ..] = word else {
+    let Some(rest) = word.len().checked_sub(1) else {
         return Err(PyValueError::new_err("an empty word"));
     };
-    let (large, rest) = (small.to_ascii_uppercase(), word.len() - 1);
     for first in (0..text.len()).step_by(BYTES) {
         py.check_signals()?;
         let some = &text[first..text.len().min(first + BYTES + rest)];
-        let found = detached(py, || {
-            some.windows(word.len())
-                .any(|own| (own[0] == small || own[0] == large) && own.eq_ignore_ascii_case(word))
-        })?;
-        if found {
+        if detached(py, || at_best(|| is_in(some, word)))? {
             return Ok(true);
         }
     }
     Ok(false)
 }
+
+/// Look where both ends of a word may stand, many places at once, and read it there.
+#[inline(always)]
+fn is_in(text: &[u8], word: &[u8]) -> bool {
+    let (first, last) = (word[0] | CASE, word[word.len() - 1] | CASE);
+    let places = (text.len() + 1).saturating_sub(word.len());
+    (0..places).step_by(SIDE).any(|at| {
+        let end = places.min(at + SIDE);
+        let (begins, ends) = (&text[at..end], &text[at + word.len() - 1..]);
+        let pairs = begins.iter().zip(ends);
+        pairs.fold(false, |any, (a, b)| any | ((a | CASE == first) & (b | CASE == last)))
+            && text[at..end + word.len() - 1]
+                .windows(word.len())
+                .any(|own| own.eq_ignore_ascii_case(word))
+    })
+}
+
+/// The bit that tells small letters from large ones.
+const CASE: u8 = 0x20;

@@ -222,7 +222,7 @@ class Literals:
     def pins(self) -> dict[str, Ints]:
         """The literals (k,) by what pins them; free ones are not there."""
         found: dict[str, list[int]] = {}
-        for row, why in enumerate(self.pinned):
+        for row, why in enumerate(self.pinned if any(self.pinned) else ()):
             if why:
                 found.setdefault(why, []).append(row)
         return {why: np.array(found[why]) for why in sorted(found)}

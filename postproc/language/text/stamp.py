@@ -6,6 +6,7 @@ import hashlib
 import re
 from dataclasses import dataclass
 
+from postproc import _native
 from postproc.language.text.source import UTF8_MARK, Source, Span
 
 _INDENT = 400  # blanks before a stamp that an editor has moved
@@ -106,6 +107,8 @@ def read_stamp(data: bytes) -> Stamp | None:
 def is_stamped(source: Source) -> bool:
     """Tell whether a program is an output of this tool, stamp moved or not."""
     data = source.data
+    if not _native.holds(data, b"postproc"):  # fast, and true of nearly no program
+        return False
     for found in _BEGINS.finditer(data):
         # Nothing but blanks, or a header's end, may stand before it in its line.
         before = data[max(found.start() - _INDENT, 0) : found.start()]
