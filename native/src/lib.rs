@@ -38,6 +38,7 @@ mod solver;
 mod spans;
 mod spline;
 mod statements;
+mod stretches;
 mod table;
 mod terms;
 mod text;
@@ -113,6 +114,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_krl, module)?)?;
     module.add_function(wrap_pyfunction!(spline::splines, module)?)?;
+    module.add_function(wrap_pyfunction!(stretches::along_stretches, module)?)?;
     module.add_function(wrap_pyfunction!(time_law::fastest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
     module.add_function(wrap_pyfunction!(number::count_decimals, module)?)?;

@@ -16,7 +16,7 @@ const ROUNDS: usize = 30;
 const STEP: f64 = 0.6; // [rad] that a joint goes at once, at the most
 const CLOSE: f64 = 1e-11; // [m, rad]
 const SAME: f64 = 1e-6; // [rad] between two solutions that are one
-const UNSOLVED: Six = [f64::NAN; 6];
+pub const UNSOLVED: Six = [f64::NAN; 6];
 
 /// A chain, and places of it to start from.
 pub struct Numeric {
@@ -35,7 +35,10 @@ impl Numeric {
     }
 
     /// Solve for all branches, from those of a pose that may be near first.
-    fn branches(&self, pose: &Pose, before: &[Six; 8]) -> [Six; 8] {
+    pub fn branches(&self, pose: &Pose, before: &[Six; 8]) -> [Six; 8] {
+        if pose.iter().any(|x| x.is_nan()) {
+            return [UNSOLVED; 8];
+        }
         let mut found = [UNSOLVED; 8];
         let mut twice = [false; 8];
         let near = before.iter().filter(|q| !q[0].is_nan());
@@ -265,10 +268,7 @@ pub fn numeric_branches<'py>(
     let (numeric, poses) = (Numeric::new(&parameters)?, poses(&flange)?);
     let mut before = [UNSOLVED; 8];
     let out = each(py, poses.len(), |i| {
-        before = match poses[i].iter().any(|x| x.is_nan()) {
-            true => [UNSOLVED; 8],
-            false => numeric.branches(&poses[i], &before),
-        };
+        before = numeric.branches(&poses[i], &before);
         before
     })?;
     Ok(blocks(py, poses.len(), (8, 6), out.into_flattened().into_flattened()))

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::chain::Parameters;
 use crate::inverse::Arm;
 use crate::lines::{poses, Pose};
-use crate::numeric::{wrapped, Numeric};
+use crate::numeric::{wrapped, Numeric, UNSOLVED};
 use crate::rows::{array, flat, in_parts, rows, same_length, Six, WORTH};
 
 /// Angles of its form, and back to those of the controller.
@@ -42,6 +42,22 @@ impl Solver {
         match &self.0 {
             Form::Closed(form) => form.arm.slot(&mixed(&form.mix, q)),
             Form::Numeric(numeric) => numeric.slot(q) as i64,
+        }
+    }
+
+    /// Solve for joint angles on a branch, on any turn; NaN where there are none.
+    ///
+    /// Of a chain without a closed form, all branches of the pose before come and go.
+    pub fn on_branch(&self, flange: &Pose, slot: i64, before: &mut [Six; 8]) -> Six {
+        let Ok(index) = usize::try_from(slot) else {
+            return UNSOLVED;
+        };
+        match &self.0 {
+            Form::Closed(form) => mixed(&form.unmix, &form.arm.branch(flange, slot)),
+            Form::Numeric(numeric) => {
+                *before = numeric.branches(flange, before);
+                before.get(index).copied().unwrap_or(UNSOLVED)
+            }
         }
     }
 

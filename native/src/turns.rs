@@ -20,13 +20,18 @@ fn within_a_turn(x: f64) -> f64 {
 }
 
 /// Shift an angle by turns into a range where that is possible.
-fn ranged(q: f64, lower: f64, upper: f64) -> f64 {
+pub fn ranged(q: f64, lower: f64, upper: f64) -> f64 {
     let q = PI - within_a_turn(PI - q);
     match (q + TAU, q - TAU) {
         (up, _) if q < lower && up <= upper => up,
         (_, down) if q > upper && down >= lower => down,
         _ => q,
     }
+}
+
+/// Put an angle on the turn that continues a motion from another one.
+pub fn nearest_turn(q: f64, near: f64) -> f64 {
+    q - TAU * ((q - near) / TAU).round_ties_even()
 }
 
 /// Put an axis on its written turn; a missing one is 0, of T3 it says nothing.

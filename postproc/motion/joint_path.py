@@ -13,7 +13,7 @@ from postproc.arrays import (
     Ints,
     any_in_rows,
     chunks,
-    largest_in_rows,
+    floats,
     spans,
 )
 from postproc.motion.branches import (
@@ -28,7 +28,6 @@ from postproc.motion.branches import (
     nearest_turns,
     on_other_turns,
     on_written_turns,
-    unwrap_samples,
     wrist_interpolated,
 )
 from postproc.motion.path import Segments, arcs, lines, sample
@@ -120,6 +119,8 @@ class PathSolver:
         reason: Index into `REASONS`, (n,).
         samples: Where the samples stand.
         source: Predecessor of each edge, (e,); becomes -1 where a path stays unknown.
+        place: Where the poses of samples stand in those of `samples`, or -1 less their
+            target, (s,).
         path: Joint angles at the samples, (s, 6) [rad], NaN where not known yet.
         placed: Flange poses known beforehand that joint angles must be found for, (n,).
         told: Targets that are known whatever leads to them, (n,).
@@ -145,8 +146,8 @@ class PathSolver:
         self.samples = sample(targets, self.flange)
         self.source = np.array(self.samples.source)
         self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
-        self._inner = np.full(len(self.path), -1)
-        self._inner[self.samples.inner] = np.arange(len(self.samples.inner))
+        self.place = np.repeat(-1 - self.samples.visit, np.diff(self.samples.start))
+        self.place[self.samples.inner] = np.arange(len(self.samples.inner))
         placed = ~is_unknown(self.flange)
         self.placed = placed & (targets.kind != TargetKind.JOINTS) & ~self.given
         self.told = np.zeros(n, dtype=bool)
@@ -263,12 +264,10 @@ class PathSolver:
 
     def flange_at(self, at: Ints) -> Floats:
         """Look up the flange poses at samples of ready edges, (k, 4, 4) [m]."""
-        samples, inner = self.samples, self._inner[at]
-        last, inside = np.flatnonzero(inner < 0), np.flatnonzero(inner >= 0)
-        edge = np.searchsorted(samples.start, at[last], side="right") - 1
-        out = np.empty((len(at), 4, 4))
-        out[last] = self.flange.take(samples.visit[edge], axis=0)
-        out[inside] = samples.flange.take(inner[inside], axis=0)
+        place, out = self.place[at], np.empty((len(at), 4, 4))
+        ends, inside = np.flatnonzero(place < 0), np.flatnonzero(place >= 0)
+        out[ends] = self.flange.take(-1 - place[ends], axis=0)
+        out[inside] = self.samples.flange.take(place[inside], axis=0)
         return out
 
     def is_known(self, v: int) -> bool:
@@ -462,102 +461,68 @@ def choose(work: PathSolver, v: int, flange: Floats, near: Floats | None) -> Edg
 # Stretches that begin behind a known target, followed all together.
 #
 # Each keeps to the branch nearest to where it begins, as long as every step along it is
-# a small one. Where one is not, the stretch is left to be followed on its own.
+# a small one: no other branch makes a stretch of small steps shorter; the first step of
+# a stretch may be larger. From its first large step on it is left to be followed on its
+# own.
 
 
 @dataclass(frozen=True)
 class _Stretches:
-    """r stretches of targets, each the only way on from the one before.
+    """Samples of e edges to n targets, and r stretches of them, as the core takes them.
 
     Attributes:
-        first: First target, (r,).
-        count: Number of targets, (r,).
-        begin: First sample, (r,).
-        size: Number of samples, (r,).
+        targets: Flange poses at the targets, (n, 4, 4) [m].
+        between, place, start: .. and at the samples, see `PathSolver`.
+        edge: First edge of each stretch, (r,).
+        count: Number of its edges, (r,).
+        near: Joint angles before it, (r, 6) [rad].
+        slot: Its branch, (r,), -1 where there is none.
     """
 
-    first: Ints
+    targets: Floats
+    between: Floats
+    place: Ints
+    start: Ints
+    edge: Ints
     count: Ints
-    begin: Ints
-    size: Ints
+    near: Floats
+    slot: Ints
 
-    def __getitem__(self, rows: Bools) -> _Stretches:
-        """Return some of them."""
-        return _Stretches(
-            self.first[rows], self.count[rows], self.begin[rows], self.size[rows]
-        )
-
-    @property
-    def targets(self) -> Ints:
-        """List all targets."""
-        return spans(self.first, self.count)
-
-    @property
-    def samples(self) -> Ints:
-        """List all samples."""
-        return spans(self.begin, self.size)
+    @classmethod
+    def of(cls, work: PathSolver, first: Ints, count: Ints) -> _Stretches:
+        """Begin stretches at targets, (r,), behind known ones."""
+        edge, near = work.targets.pred_start[first], work.q[first - 1]
+        head = work.flange_at(work.samples.start[edge])
+        slot = nearest_slots(work.arm.inverse(head).q, near)
+        known = work.flange, work.samples.flange, work.place, work.samples.start
+        return cls(*known, edge, count, near, slot)
 
 
-def trace_stretches(work: PathSolver, smooth: Bools, most: int) -> Bools:
+def trace_stretches(work: PathSolver, smooth: Bools) -> Bools:
     """Follow what goes on from known targets; tell which targets that settles, (n,).
 
     Args:
-        work: The workspace.
+        work: The workspace, on whose paths nothing is known yet.
         smooth: Targets that continue a Cartesian path from the one before, (n,).
-        most: Targets of a stretch that are followed.
     """
     settled = np.zeros(len(smooth), dtype=bool)
     ends = np.flatnonzero(np.diff(np.concatenate([[0], smooth, [0]])))
-    first, count = ends[::2], np.minimum(ends[1::2] - ends[::2], most)
+    first, count = ends[::2], ends[1::2] - ends[::2]
     known = ~np.isnan(work.q[first - 1, 0])
-    first, count = first[known], count[known]
-    edge, start = work.targets.pred_start[first], work.samples.start
-    some = _Stretches(first, count, start[edge], start[edge + count] - start[edge])
-    if len(some.first) == 0:
+    if not known.any():
         return settled
-    flange = work.flange_at(some.samples)
-    near, head = work.q[some.first - 1], np.cumsum(some.size) - some.size
-    slot = nearest_slots(work.arm.inverse(flange[head]).q, near)
-    q = work.arm.on_branch(flange, np.repeat(slot, some.size))
-    q = work.arm.into_range(q)
-    q = _unwrap(q, near, head, some.size)
-    # As in `follow`: no other branch makes a stretch of small steps shorter; the first
-    # step of a stretch may be larger.
-    step = largest_in_rows(_steps(q, near, head))
-    large = ~(step <= SUSPICIOUS)
-    large[head] = ~(step[head] <= LOST)
-    good = (~np.logical_or.reduceat(large, head)) & (slot >= 0)
-    _settle(work, some[good], q[np.repeat(good, some.size)], slot[good])
-    settled[some[good].targets] = True
-    return settled
-
-
-def _steps(q: Floats, near: Floats, head: Ints) -> Floats:
-    """Measure what every joint turns by from sample to sample, (s, 6) [rad]."""
-    step = np.empty_like(q)
-    step[1:] = q[1:] - q[:-1]
-    step[head] = q[head] - near
-    return np.abs(step, out=step)
-
-
-def _unwrap(q: Floats, near: Floats, head: Ints, size: Ints) -> Floats:
-    """Put samples on the turns that continue their stretches, (s, 6) [rad]."""
-    wraps = any_in_rows(_steps(q, near, head) >= np.pi)
-    for i in np.flatnonzero(np.logical_or.reduceat(wraps, head)).tolist():
-        rows = slice(head[i], head[i] + size[i])
-        q[rows] = unwrap_samples(np.vstack([near[i], q[rows]]))[1:]
-    return q
-
-
-def _settle(work: PathSolver, some: _Stretches, q: Floats, slot: Ints) -> None:
-    """Write down where stretches lead."""
-    v = some.first
+    some = _Stretches.of(work, first[known], count[known])
+    arm, steps = work.arm, (LOST, SUSPICIOUS)
+    limits = floats(arm.lower), floats(arm.upper)
+    work.path, done = _native.along_stretches(arm.solver, some, limits, steps)
+    v, slot = first[known], some.slot
     before = work.branches_at(v - 1)
-    work.reason[v[(before >= 0) & (before != slot)]] = CODE[PATH_JUMP]
-    work.path[some.samples] = q
-    edge = spans(work.targets.pred_start[v], some.count)
-    work.q[some.targets] = work.path[work.samples.start[edge + 1] - 1]
-    work.slot[some.targets] = np.repeat(slot, some.count)
+    work.reason[v[(done > 0) & (before >= 0) & (before != slot)]] = CODE[PATH_JUMP]
+    rows, edge = spans(v, done), spans(some.edge, done)
+    work.q[rows] = work.path[some.start[edge + 1] - 1]
+    work.slot[rows] = np.repeat(slot, done)
+    settled[rows] = True
+    return settled
 
 
 # The geometric path of a whole program in joint space.
@@ -633,7 +598,7 @@ def trace(arm: Arm, targets: Targets, known: FixedTargets | None = None) -> Trac
     work = PathSolver(arm, targets, known)
     settled = _from_strings(work) | work.given
     work.told = ~np.isnan(work.q[:, 0])
-    settled |= trace_stretches(work, work.single & ~settled, WINDOW)
+    settled |= trace_stretches(work, work.single & ~settled)
     work.solve(settled)
     _in_order(work, np.flatnonzero(~settled), work.single & ~settled)
     return _finish(work)

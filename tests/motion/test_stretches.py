@@ -24,7 +24,7 @@ SINGULAR = 4  # of the paths below, the one through the wrist singularity
 def one_by_one(arm: Arm, targets: Targets, monkeypatch: pytest.MonkeyPatch) -> Trace:
     with monkeypatch.context() as patched:
         patched.setattr(
-            module, "trace_stretches", lambda work, smooth, _: np.zeros_like(smooth)
+            module, "trace_stretches", lambda work, smooth: np.zeros_like(smooth)
         )
         return trace(arm, targets)
 
