@@ -90,6 +90,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pose::inverse, module)?)?;
     module.add_function(wrap_pyfunction!(pose::pose_from_record, module)?)?;
     module.add_function(wrap_pyfunction!(pose::rotation_vector, module)?)?;
+    module.add_function(wrap_pyfunction!(pose::rotations, module)?)?;
     module.add_function(wrap_pyfunction!(pose::times, module)?)?;
     module.add_function(wrap_pyfunction!(terms::turned, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;

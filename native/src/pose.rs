@@ -6,10 +6,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{self, poses, Pose, Rotation};
-use crate::rows::{array, blocks, each, flat, groups, rows, same_length, Six};
+use crate::rows::{array, blocks, each, flat, groups, rows, same_length, Six, Three};
 use crate::trig::sin_cos;
 
 const MM: f64 = 1e-3;
+const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
 
 fn to_python(py: Python<'_>, poses: Vec<Pose>) -> Bound<'_, PyArray3<f64>> {
     blocks(py, poses.len(), (4, 4), poses.into_flattened())
@@ -47,6 +48,28 @@ fn from_record(record: &Six) -> Pose {
         0.0,
         0.0,
         1.0,
+    ]
+}
+
+/// The rotation about a vector [rad], by rows.
+pub fn rotation_from_vector([x, y, z]: Three) -> [f64; 9] {
+    let angle = (x * x + y * y + z * z).sqrt();
+    let ([sin], [w]) = sin_cos(&[angle / 2.0]);
+    let square = angle * angle;
+    let scale =
+        if angle <= SMALL { 0.5 - square / 48.0 + square * square / 3840.0 } else { sin / angle };
+    let (x, y, z) = (scale * x, scale * y, scale * z);
+    let (xx, yy, zz, ww) = (x * x, y * y, z * z, w * w);
+    [
+        xx - yy - zz + ww,
+        2.0 * (x * y - z * w),
+        2.0 * (x * z + y * w),
+        2.0 * (x * y + z * w),
+        -xx + yy - zz + ww,
+        2.0 * (y * z - x * w),
+        2.0 * (x * z - y * w),
+        2.0 * (y * z + x * w),
+        -xx - yy + zz + ww,
     ]
 }
 
@@ -100,4 +123,15 @@ pub fn rotation_vector<'py>(
     }
     let rotations: &[Rotation] = groups(groups(flat(&given)?));
     Ok(array(py, each(py, rotations.len(), |i| lines::rotation_vector(&rotations[i]))?))
+}
+
+/// Return the rotations (n, 9), by rows, about vectors (n, 3) [rad].
+#[pyfunction]
+#[pyo3(name = "rotation_from_vector")]
+pub fn rotations<'py>(
+    py: Python<'py>,
+    vectors: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let vectors = rows::<3>(&vectors)?;
+    Ok(array(py, each(py, vectors.len(), |i| rotation_from_vector(vectors[i]))?))
 }

@@ -5,36 +5,12 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::lines::{poses, Pose};
-use crate::pose::{inverted, product};
+use crate::pose::{inverted, product, rotation_from_vector};
 use crate::rows::{blocks, each, flat, rows, same_length};
 use crate::trig::sin_cos;
 
-const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
-
 /// Rotation at the start, turn, centre, radius, tangent, chord, and angle.
 type Segment = [f64; 25];
-
-/// The rotation about a vector [rad], by rows: `postproc.robot.pose.rotation_from_vector`.
-fn rotation_from_vector([x, y, z]: [f64; 3]) -> [f64; 9] {
-    let angle = (x * x + y * y + z * z).sqrt();
-    let ([sin], [w]) = sin_cos(&[angle / 2.0]);
-    let square = angle * angle;
-    let scale =
-        if angle <= SMALL { 0.5 - square / 48.0 + square * square / 3840.0 } else { sin / angle };
-    let (x, y, z) = (scale * x, scale * y, scale * z);
-    let (xx, yy, zz, ww) = (x * x, y * y, z * z, w * w);
-    [
-        xx - yy - zz + ww,
-        2.0 * (x * y - z * w),
-        2.0 * (x * z + y * w),
-        2.0 * (x * y + z * w),
-        -xx + yy - zz + ww,
-        2.0 * (y * z - x * w),
-        2.0 * (x * z - y * w),
-        2.0 * (y * z + x * w),
-        -xx - yy + zz + ww,
-    ]
-}
 
 /// Place the TCP at a fraction of a path.
 fn pose(segment: &Segment, u: f64) -> Pose {

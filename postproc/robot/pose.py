@@ -15,7 +15,6 @@ from postproc.arrays import Bools, Floats, Ints, few_rows, floats
 
 MM = 1e-3  # [m]
 SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
-SMALL = 1e-3  # [rad] below which a series stands for a quotient of two small numbers
 
 
 def rotation_from_zyz(zyz_deg: Floats) -> Floats:
@@ -138,23 +137,11 @@ def cross(a: Floats, b: Floats) -> Floats:
 def rotation_from_vector(vector: Floats) -> Floats:
     """Return the rotations (..., 3, 3) about vectors (..., 3) [rad].
 
-    As in scipy, which takes longer to load than a small program to compensate.
+    As in scipy, which takes longer to load than a small program to compensate. Raises
+    ValueError where vectors do not have three components.
     """
-    x, y, z = np.moveaxis(vector, -1, 0)
-    angle = np.sqrt(x * x + y * y + z * z)
-    square, small = angle * angle, angle <= SMALL
-    half_sinc = np.sin(angle / 2) / np.where(small, 1.0, angle)
-    series = 0.5 - square / 48 + square * square / 3840
-    scale = np.where(small, series, half_sinc)
-    x, y, z, w = scale * x, scale * y, scale * z, np.cos(angle / 2)
-    xx, yy, zz, ww = x * x, y * y, z * z, w * w
-    R = np.empty((*vector.shape, 3))
-    R[..., 0, 0], R[..., 1, 1] = xx - yy - zz + ww, -xx + yy - zz + ww
-    R[..., 2, 2] = -xx - yy + zz + ww
-    R[..., 1, 0], R[..., 0, 1] = 2 * (x * y + z * w), 2 * (x * y - z * w)
-    R[..., 2, 0], R[..., 0, 2] = 2 * (x * z - y * w), 2 * (x * z + y * w)
-    R[..., 2, 1], R[..., 1, 2] = 2 * (y * z + x * w), 2 * (y * z - x * w)
-    return R
+    rows = floats(np.reshape(vector, (-1, 3)))
+    return _native.rotation_from_vector(rows).reshape(*vector.shape, 3)
 
 
 def lengths(vectors: Floats) -> Floats:
