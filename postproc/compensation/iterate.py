@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
-from typing import Any
 
 import numpy as np
 
@@ -105,6 +104,30 @@ class SolverState:
 
 
 @dataclass(frozen=True)
+class Look:
+    """What a look at a proposal for n targets has found.
+
+    Attributes:
+        leads: Where its numbers lead.
+        corrected: Which targets it corrects, (n,).
+        off: .. and which of them are reached from sides not foretold, (n,).
+        missed: By what targets miss theirs and are to be bent, (n, 3) [m].
+        late: Too many rounds have not settled them.
+    """
+
+    leads: Replanned
+    corrected: Bools
+    off: Bools
+    missed: Floats
+    late: bool
+
+    @property
+    def is_settled(self) -> bool:
+        """Tell whether nothing is off."""
+        return not (self.off.any() or self.missed.any())
+
+
+@dataclass(frozen=True)
 class Iteration:
     """What does not change from round to round.
 
@@ -172,29 +195,22 @@ class Iteration:
         return departure(arm, old, new, tool, setting.offset)
 
     def find_aims(
-        self,
-        lead: Floats,
-        watched: slice,
-        current: SolverState,
-        looked: Replanned,
-        corrected: Bools,
-        off: Bools,
-        missed: Floats,
-        late: bool,
+        self, current: SolverState, look: Look, lead: Floats, watched: slice
     ) -> NextAims:
         """Give the sides to correct targets for next, see `next_aims`.
 
         Where too many rounds have not settled them, it is the middle.
         """
         solved, tool = current.solved, self.planned.plan.tool[:, :3, 3]
-        free = corrected & (off | ~current.settled)
+        free = look.corrected & (look.off | ~current.settled)
         with self.setting.clock("solve"):
-            given = self.setting.model, solved, self.states.with_(tool=tool), looked
-            found = next_aims(*given, corrected, free, off, missed, lead, watched)
-        if not late:
+            states = self.states.with_(tool=tool)
+            given = self.setting.model, solved, states, look.leads, look.corrected
+            found = next_aims(*given, free, look.off, look.missed, lead, watched)
+        if not look.late:
             return found
-        middle = (solved.direction + looked.side) / 2
-        return replace(found, sides=np.where(off[:, None], middle, found.sides))
+        middle = (solved.direction + look.leads.side) / 2
+        return replace(found, sides=np.where(look.off[:, None], middle, found.sides))
 
     def next_aim(
         self, current: SolverState, found: NextAims, missed: Floats
@@ -226,6 +242,15 @@ class Iteration:
             found = current.solved, current.departure, current.aside
             left = current.held, current.swung
             return Round(*given, *found, *left, self.setting).propose()
+
+    def look(
+        self, current: SolverState, proposal: Proposal, leads: Replanned, number: int
+    ) -> Look:
+        """Compare where a proposal leads with what was foretold, in a round."""
+        late = number >= ROUNDS
+        off = current.find_off(proposal, leads.side, late)
+        missed = self.measure_misses(proposal, leads.aside, current.aside, number)
+        return Look(leads, proposal.corrected, off, missed, late)
 
     def measure_misses(
         self, proposal: Proposal, aside: Floats, meant: Floats, number: int
@@ -429,11 +454,10 @@ def iterate(
     course = _Course(iteration, replanner, lead, trail)
     current, number = iteration.first_aim(), 0
     for turn in count():  # ends: from round ROUNDS on, `settled` or `held` grows
-        proposal, late = iteration.propose(current), number >= ROUNDS
-        looked = course.look(current, proposal, turn)
-        off = current.find_off(proposal, looked.side, late)
-        missed = iteration.measure_misses(proposal, looked.aside, current.aside, number)
-        if not (off.any() or missed.any()):
+        proposal = iteration.propose(current)
+        leads = course.replan(current, proposal, turn)
+        look = iteration.look(current, proposal, leads, number)
+        if look.is_settled:
             done, flipped = _read_back(course, current, proposal)
             swung = iteration.find_limit_violations(proposal, done)
             if done is not None and not swung.any():
@@ -441,11 +465,11 @@ def iterate(
             held, swung = current.held | flipped, current.swung | swung
             current, number = replace(current, held=held, swung=swung), CORNERS
             continue
-        if late:
-            current = replace(current, settled=current.settled | off)
-        given = current, looked, proposal.corrected, off, missed
-        found = course.settle(turn, *given, late)
-        current, number = iteration.next_aim(current, found, missed), number + 1
+        if look.late:
+            current = replace(current, settled=current.settled | look.off)
+        found = course.settle(turn, current, look)
+        current = iteration.next_aim(current, found, look.missed)
+        number += 1
     raise AssertionError("unreachable")
 
 
@@ -465,7 +489,7 @@ class _Course:
     lead: Boundary
     trail: RoundLog
 
-    def look(
+    def replan(
         self, current: SolverState, proposal: Proposal, turn: int | None = None
     ) -> Replanned:
         """Find where a proposal leads; without a round: as it is written."""
@@ -479,10 +503,10 @@ class _Course:
             self.trail.see(turn, _glimpse(current, proposal, found))
         return found
 
-    def settle(self, turn: int, *given: Any) -> NextAims:
+    def settle(self, turn: int, current: SolverState, look: Look) -> NextAims:
         """Find what to correct targets for next, see `Iteration.find_aims`."""
         lead = self.lead.settled.get(turn, NO_STATES)
-        found = self.iteration.find_aims(lead, self.trail.seam, *given)
+        found = self.iteration.find_aims(current, look, lead, self.trail.seam)
         self.trail.settled[turn] = found.seen
         return found
 
@@ -520,7 +544,7 @@ def _read_back(
     iteration = course.iteration
     setting = iteration.setting
     edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
-    last = course.look(current, proposal)
+    last = course.replan(current, proposal)
     flipped = current.find_off(proposal, last.side, late=True)
     if flipped.any():
         return None, flipped
