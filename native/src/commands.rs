@@ -4,9 +4,9 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::lines::{poses, Pose, Rotation};
+use crate::lines::{poses, Pose};
 use crate::model::{Core, Rows, States};
-use crate::pose::{inverted, product};
+use crate::pose::{inverted, product, rotation_from_vector};
 use crate::rows::{array, blocks, dot, in_parts, minus, Six, Three, WORTH};
 use crate::solver::Solver;
 use crate::terms::State;
@@ -14,31 +14,12 @@ use crate::terms::State;
 const CLOSE: f64 = 2e-7; // [m] where iterating stops
 const CLOSE_TURN: f64 = 2e-7; // [rad] likewise
 const MOST: usize = 5; // iterations
-const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
 
 /// A command of one target.
 struct Command {
     q: Six,
     pose: Pose,
     residual: f64,
-}
-
-/// The rotation about a vector [rad], as `pose.rotation_from_vector`.
-fn rotation(vector: &Three) -> Rotation {
-    let angle = dot(vector, vector).sqrt();
-    let square = angle * angle;
-    let scale = if angle <= SMALL {
-        0.5 - square / 48.0 + square * square / 3840.0
-    } else {
-        (angle / 2.0).sin() / angle
-    };
-    let ([x, y, z], w) = (vector.map(|part| scale * part), (angle / 2.0).cos());
-    let (xx, yy, zz, ww) = (x * x, y * y, z * z, w * w);
-    [
-        [xx - yy - zz + ww, 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), -xx + yy - zz + ww, 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), -xx - yy + zz + ww],
-    ]
 }
 
 fn place(pose: &Pose) -> Three {
@@ -99,10 +80,10 @@ impl Search<'_> {
 
 /// Turn a command's axes against a turn.
 fn turn_back(pose: &mut Pose, wanted: &Pose, turned: &Three) {
-    let back = rotation(&turned.map(|angle| -angle));
-    for (i, row) in back.iter().enumerate() {
+    let back = rotation_from_vector(turned.map(|angle| -angle));
+    for i in 0..3 {
         for j in 0..3 {
-            pose[4 * i + j] = (0..3).map(|k| row[k] * wanted[4 * k + j]).sum();
+            pose[4 * i + j] = (0..3).map(|k| back[3 * i + k] * wanted[4 * k + j]).sum();
         }
     }
 }
