@@ -162,7 +162,7 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
     for v in now.worst_first:
         if plan.crowded and room <= 0:
             break
-        if not _needs_points(now, v, now.sizes[v]):
+        if v not in plan.open or now.sizes[v] <= now.task.aim:
             continue
         via = v in whole  # the point on the way of an arc becomes one, too
         more = _put_on_path(now, plan, v, room - via)
@@ -174,13 +174,6 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
                 whole -= {first, first + 1}
         plan = more
     return plan
-
-
-def _needs_points(now: PathPrediction, v: int, size: float) -> bool:
-    """Return True if a path that is so far off [m] at the most gets more points."""
-    plan, task = now.plan, now.task
-    near = v in plan.beside and plan.points.get(v, ()) in ((), (1.0,))
-    return v in plan.open and size > (task.tolerance / 2 if near else task.aim)
 
 
 def _put_on_path(
