@@ -51,12 +51,16 @@ class Part:
         kept: How they are corrected.
         in_time: They, in time; its paths are those of the source's moves.
         own: Which of them each visit of the source is, (n,); -1 where it is none.
+        steep_pieces: What is known of the pieces of moves, see `PathPrediction`.
+        wanted: Which points moves want beside those that they have, likewise.
     """
 
     visits: Visits
     kept: WindowResult
     in_time: InTime
     own: Ints
+    steep_pieces: dict[int, list[int]] = field(default_factory=dict, repr=False)
+    wanted: dict[tuple[Any, ...], list[float]] = field(default_factory=dict, repr=False)
     _refused: dict[tuple[int, bool], str] = field(default_factory=dict, repr=False)
 
     @property

@@ -134,10 +134,12 @@ def drop_where_steep(now: PathPrediction) -> InsertionPlan:
     """
     plan = now.plan
     for v, known in now.plan.points.items():
+        if not (steep := now.steep_pieces(v)):
+            continue
         ends, gone = [0.0, *known, 1.0], set[float]()
         room = {b: c - a for a, b, c in zip(ends, ends[1:], ends[2:], strict=False)}
         free = {*known[v in plan.stops :]} - {1.0}
-        for k in now.steep_pieces(v):
+        for k in steep:
             if either := free.intersection(ends[k : k + 2]):
                 gone.add(max(either, key=room.__getitem__))
         if gone:
@@ -162,7 +164,7 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
     for v in now.worst_first:
         if plan.crowded and room <= 0:
             break
-        if not _needs_points(now, v, now.sizes[v]):
+        if v not in plan.open or now.sizes[v] <= now.task.aim:
             continue
         via = v in whole  # the point on the way of an arc becomes one, too
         more = _put_on_path(now, plan, v, room - via)
@@ -174,13 +176,6 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
                 whole -= {first, first + 1}
         plan = more
     return plan
-
-
-def _needs_points(now: PathPrediction, v: int, size: float) -> bool:
-    """Return True if a path that is so far off [m] at the most gets more points."""
-    plan, task = now.plan, now.task
-    near = v in plan.beside and plan.points.get(v, ()) in ((), (1.0,))
-    return v in plan.open and size > (task.tolerance / 2 if near else task.aim)
 
 
 def _put_on_path(
@@ -232,6 +227,15 @@ def _find_stop(
 
 
 def _on_path(now: PathPrediction, v: int) -> list[float]:
+    """Find what `_seek_on_path` does, once as long as nothing changes there."""
+    wanted, plan = now.part_of(v).wanted, now.plan
+    key = v, plan.points.get(v), plan.shut.get(v)
+    if key not in wanted:
+        wanted[key] = _seek_on_path(now, v)
+    return wanted[key]
+
+
+def _seek_on_path(now: PathPrediction, v: int) -> list[float]:
     """Find a point in every part of a path that is left too far, the worst first."""
     plan, (paths, k) = now.plan, now.path_to(v)
     samples = paths.samples(k)

@@ -21,7 +21,6 @@ class InsertionPlan:
     Attributes:
         open: Moves that may be split, by their visit: the shortest piece, and how far
             from both ends [m].
-        beside: Those among them that keep near enough, but are halves of others' arcs.
         idle: Moves that may have a stop that preloads the backlash, and how.
         unconfirmed: Moves that may not, as too much is open of their flanks.
         points: What is on their ways, shares of these, by visit.
@@ -37,7 +36,6 @@ class InsertionPlan:
     """
 
     open: Mapping[int, tuple[float, float, float]] = field(default_factory=dict)
-    beside: frozenset[int] = frozenset()
     idle: Mapping[int, BacklashPreload] = field(default_factory=dict)
     unconfirmed: frozenset[int] = frozenset()
     points: Mapping[int, tuple[float, ...]] = field(default_factory=dict)

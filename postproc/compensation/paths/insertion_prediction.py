@@ -341,21 +341,27 @@ class InsertionTask:
     def _predict_windows(
         self, plan: InsertionPlan, keys: Mapping[int, Key], some: Sequence[int]
     ) -> bool:
-        """Predict some windows, and keep them; return False where all should be.
+        """Predict some windows, and keep them; all where they are most of the program.
 
         Args:
             plan: The points of the program.
             keys: What it puts on the windows.
             some: These windows.
+
+        Returns:
+            False where joints are elsewhere, and the program should be written.
         """
-        windows = self.windows
-        inside, seeds = windows.cover(some)
+        inside, seeds = self.windows.cover(some)
         if np.count_nonzero(inside) > changed_windows.MOST * len(inside):
-            return False
+            some, inside[:] = [*keys], True
         own = {v: at for v, at in plan.points.items() if inside[v]}
         plan = replace(plan, points=own)
-        reading, rows = self._insert(plan)
-        reading, mine, taken = take_windows(reading, rows, inside, seeds, windows.q)
+        reading, rows = self._insert(plan, proves=False)
+        mine, taken = rows, np.arange(len(reading.visits))
+        if not inside.all():
+            reading, mine, taken = take_windows(
+                reading, rows, inside, seeds, self.windows.q
+            )
         reading, kept = self._correct(reading)
         again = reading.with_values(kept.decisions.corrected)
         owner = np.searchsorted(rows, taken)
@@ -372,14 +378,16 @@ class InsertionTask:
         off = np.abs(q - self.windows.q[rows])
         return bool(np.nan_to_num(off).max(initial=0.0) < changed_windows.SAME)
 
-    def _insert(self, plan: InsertionPlan) -> tuple[ParsedProgram, Ints]:
+    def _insert(
+        self, plan: InsertionPlan, proves: bool = True
+    ) -> tuple[ParsedProgram, Ints]:
         """Put the points of a plan into the program, see `insert`."""
         with self.setting.clock("insert"):
             put = PathPoints(
                 plan.points, plan.preloads, plan.chords, plan.approaches,
                 self.sides.of_plan(plan), self._joints_along,
             )  # fmt: skip
-            return insert(self.reading, put, self.splitter, self.setting.cell)
+            return insert(self.reading, put, self.splitter, self.setting.cell, proves)
 
     def _correct(self, reading: ParsedProgram) -> tuple[ParsedProgram, WindowResult]:
         options = self.setting.options.without_clones()
@@ -517,6 +525,11 @@ class PathPrediction:
     def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""
         part = self.part_of(v)
+        if v not in part.steep_pieces:
+            part.steep_pieces[v] = self._find_steep_pieces(part, v)
+        return part.steep_pieces[v]
+
+    def _find_steep_pieces(self, part: Part, v: int) -> list[int]:
         marked, via = part.steep, part.visits.motion.via
         begin = int(part.own[self.task.visits.graph.before[v]])
         pieces = enumerate(pairwise([begin, *self.ends(v)]))

@@ -17,7 +17,7 @@ from postproc.compensation.paths.insertion_prediction import (
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
 
-MOST = 0.95  # of a way: that much is to be within half of the tolerance
+MOST = 0.95  # of a way: that much is to be as near as points aim at
 SPEED = (
     "Set the speed before the move, or in the cell [motion] linear_mm_s, or "
     "linear_limit_mm_s where the speed is a value at run time"
@@ -46,20 +46,24 @@ def find_split(now: PathPrediction) -> InsertionPlan:
     return replace(
         plan,
         open=open_,
-        beside=frozenset(open_.keys() - far),
         idle={v: taken for v, taken in stops.items() if taken is not None},
         unconfirmed=frozenset(v for v, taken in stops.items() if taken is None),
     )
 
 
 def _list_far(now: PathPrediction) -> set[int]:
-    """List the moves that are left too far, or most of whose way is not near enough."""
-    paths, tolerance = now.parts[0].paths, now.task.tolerance
+    """List the moves that are left too far, or most of whose way is not near enough.
+
+    Near enough is what points aim at. Were it farther, a move a little nearer would
+    keep what points take from one a little farther off: a gap of hardly any difference
+    in the predictions, by which more data could make a path worse.
+    """
+    paths, task = now.parts[0].paths, now.task
     step = np.diff(paths.way, prepend=0.0)
     step[paths.first[:-1]] = 0.0
-    far = np.where(paths.after.across > tolerance / 2, step, 0.0)
+    far = np.where(paths.after.across > task.aim, step, 0.0)
     off, whole = (np.add.reduceat(each, paths.first[:-1]) for each in (far, step))
-    far_off = (off > (1.0 - MOST) * whole) | (paths.after.sizes > tolerance)
+    far_off = (off > (1.0 - MOST) * whole) | (paths.after.sizes > task.tolerance)
     return set(paths.visit[far_off].tolist())
 
 
