@@ -154,8 +154,6 @@ class TaskMachine(Interpreter[Arrived]):
         passed: Statements that lead to the next one and do nothing.
         task: What its names mean.
         start: What the cell says.
-        visits: Arrivals by number.
-        keys: Context, row and number within the row of each.
         diagnostics: What else was found.
         reached: Which statements of each file are moves that some way leads to.
         beside: Statements that run in ways that are not followed: file, first row, and
@@ -168,8 +166,6 @@ class TaskMachine(Interpreter[Arrived]):
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     task: TaskSymbols[Any] = field(kw_only=True)
     start: Start = field(kw_only=True)
-    visits: list[Any] = field(default_factory=list)
-    keys: list[tuple[Context, int, int]] = field(default_factory=list)
     diagnostics: set[Diagnostic] = field(default_factory=set)
     reached: list[Bools] = field(init=False)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
@@ -659,11 +655,6 @@ class TaskMachine(Interpreter[Arrived]):
         """Return visits; of those not distinguished, all that there may be."""
         every = origins | self.lost if MANY in origins else origins
         return {k for k in every if k >= 0}
-
-    def find_unsure_stops(self) -> set[int]:
-        """Return the visits at which it is not known whether the arm stops."""
-        leads = set[int]().union(*(visit.origins for visit in self.visits))
-        return self.lost | (self.paused & leads)
 
     def unknown(self, at: At, here: Arrived, what: str = NOT_FOLLOWED) -> Arrived:
         """Say that a statement may move, and forget what was known."""

@@ -15,6 +15,7 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.conditions import DISTURBING
 from postproc.language.pdl2.evaluate import (
+    Execution,
     bare,
     copy_parts,
     fill,
@@ -24,7 +25,6 @@ from postproc.language.pdl2.evaluate import (
 )
 from postproc.language.pdl2.job import Place
 from postproc.language.pdl2.machine import (
-    Execution,
     Machine,
     escape_names,
     invalidate,

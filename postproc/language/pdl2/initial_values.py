@@ -19,7 +19,7 @@ from postproc.language.pdl2.abstract_state import (
     wholes,
 )
 from postproc.language.pdl2.entries import POSITIONS, Entries
-from postproc.language.pdl2.evaluate import ProgramPoint
+from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
 from postproc.language.pdl2.machine import (
     OTHERS_WRITE,
@@ -192,7 +192,7 @@ def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
         if why := _why_untrusted(world, key):
             world.initial[key] = Nothing(why)
             continue
-        value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
+        value = Execution(world, place, variable.row, store).value(variable.initial)
         if variable.arm not in (0, world.arm):
             value = Nothing(points_of(variable.arm))
         if isinstance(value, Position) and not value.name:

@@ -15,10 +15,10 @@ from postproc.language.language import Start
 from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
+from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.initial_values import fill_initial, keep_values
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
-    Execution,
     Goal,
     Machine,
     MoveForm,
@@ -39,7 +39,7 @@ from postproc.language.pdl2.side_effects import (
     names_but_ends,
     words_in,
 )
-from postproc.language.pdl2.to_visits import Collector
+from postproc.language.pdl2.to_visits import Pdl2Collector
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.visits import START, Diagnostic, Meaning, Visits
 from postproc.robot.trajectory import Motion
@@ -336,7 +336,7 @@ def resolve(
     _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
-    visits = Collector(machine).collect()
+    visits = Pdl2Collector(machine).collect()
     machine.root.forget()
     return Resolved(visits, tuple(sorted(world.diagnostics)))
 

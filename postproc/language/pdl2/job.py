@@ -223,7 +223,6 @@ class World:
     variables: ValueFile | None
     slot_base: dict[str, int] = field(default_factory=dict)
     row_base: dict[str, int] = field(default_factory=dict)
-    files: list[str] = field(default_factory=list)
     initial: InitialValues = field(default_factory=InitialValues)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     loose: dict[str, str] = field(default_factory=dict)
@@ -244,14 +243,12 @@ class World:
             self.slot_base[program.lines.source.name] = base
             self.row_base[program.lines.source.name] = row
             row += len(program.lines) + 1
-            self.files.append(program.lines.source.name)
             base += len(program.lines.numbers)
             source = program.lines.source
             self.taught_lines[source.name] = COMMENTS.list_taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)
         if self.variables is not None:
             self.slot_base[self.variables.source.name] = base
-            self.files.append(self.variables.source.name)
 
     @property
     def arm(self) -> int:

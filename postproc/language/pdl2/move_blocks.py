@@ -12,12 +12,12 @@ from postproc.arrays import Bools, Ints
 from postproc.language import ir
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
+from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.external_routines import stays_still
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
     HELD,
     WRITTEN,
-    Execution,
     Goal,
     Machine,
     MoveForm,
@@ -433,9 +433,8 @@ class MoveBlocks:
         """
         here.row = int(run.rows[0])
         come = self.machine.predecessors(here)
-        run = replace(run, predecessors=come, reason=here.reason)
-        base = self.machine.record(here, 0, run)
-        here.store.last = frozenset({base + len(run) - 1})
+        run = replace(run, origins=come, reason=here.reason)
+        here.store.last = frozenset({self.machine.record(here, 0, run)})
 
 
 def _points(

@@ -9,15 +9,8 @@ from postproc.language import ir
 from postproc.language.analysis.origins import NOWHERE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
-from postproc.language.pdl2.evaluate import SINGLE, parts_under
-from postproc.language.pdl2.machine import (
-    Execution,
-    Goal,
-    Machine,
-    MoveForm,
-    escape_names,
-    single,
-)
+from postproc.language.pdl2.evaluate import SINGLE, Execution, parts_under
+from postproc.language.pdl2.machine import Goal, Machine, MoveForm, escape_names, single
 from postproc.language.pdl2.side_effects import goes_to_target, references
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, add_unknown
 from postproc.language.visits import Meaning
