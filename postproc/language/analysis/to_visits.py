@@ -148,6 +148,28 @@ class Collector:
         origins = [number_origins(one, self.last) for one in every]
         return chain_visits(self.counts, origins)
 
+    def rows_of(self, one: Any) -> tuple[int, slice | Ints]:
+        """Return the file of what was found, and the rows of its moves there."""
+        return one.scope.file, slice(one.row, one.row + one.count)
+
+    def find_unreached(self, moves: Iterable[Indices]) -> dict[str, Ints]:
+        """Return the lines of moves that no way leads to, ascending, by file.
+
+        Args:
+            moves: Rows of the moves of every file.
+        """
+        missed = [np.zeros(len(text), bool) for text in self.texts]
+        for own, rows in zip(missed, moves, strict=False):
+            own[rows] = True
+        for file, visited in map(self.rows_of, self.found):
+            missed[file][visited] = False
+        lines = (
+            np.unique(t.begin_line[own])
+            for t, own in zip(self.texts, missed, strict=True)
+        )
+        found = zip(self.files, lines, strict=True)
+        return {name: own.astype(np.int64) for name, own in found if len(own)}
+
     @property
     def files(self) -> list[str]:
         """The names of the files."""

@@ -269,8 +269,7 @@ class ModeReader:
 
     def _assign(self, modes: KrlModes, one: ir.Assignment) -> KrlModes | None:
         """Carry an assignment out where nothing runs beside the program."""
-        parts = ir.walk(one.value)
-        called = [part.name for part in parts if isinstance(part, ir.FunctionCall)]
+        called = [call.name for call in ir.calls_in(one.value)]
         own = next((name for name in called if name in self.task.routines), "")
         if own:  # it gives a value, and is not followed
             one = replace(one, value=ir.FunctionCall(f"{own} of the files", ()))

@@ -6,6 +6,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from postproc.arrays import Ints
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
@@ -32,6 +35,7 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.side_effects import (
     CallGraph,
+    has_target,
     is_harmless,
     list_changed_arguments,
     list_live,
@@ -296,10 +300,12 @@ class Resolved:
     Attributes:
         visits: Its arrivals.
         diagnostics: What was found, sorted by file and line.
+        missed: Lines of moves that no way leads to, by file.
     """
 
     visits: Visits
     diagnostics: tuple[Diagnostic, ...]
+    missed: Mapping[str, Ints]
 
 
 def resolve(
@@ -336,9 +342,12 @@ def resolve(
     _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
-    visits = Pdl2Collector(machine).collect()
+    collector = Pdl2Collector(machine)
+    visits = collector.collect()
+    moves = (np.flatnonzero(one.lines.which(has_target)) for one in world.programs())
+    missed = collector.find_unreached(moves)
     machine.root.forget()
-    return Resolved(visits, tuple(sorted(world.diagnostics)))
+    return Resolved(visits, tuple(sorted(world.diagnostics)), missed)
 
 
 def _keep_exported(world: World, machine: Machine) -> None:

@@ -192,6 +192,10 @@ class Pdl2Collector(Collector):
                 zone = replace(one.zone, rule=ZoneRule.UNKNOWN)
                 c.condition[mine] = c.conditions[replace(one, zone=zone)]
 
+    def rows_of(self, run: MoveRun) -> tuple[int, Ints]:
+        """Return the file of a run and its rows, see `Collector.rows_of`."""
+        return self.files.index(run.place.program.lines.source.name), run.rows
+
     def origins_of(self, run: MoveRun) -> Origins:
         """Return where the arm may come from, in recursion from anywhere."""
         again = id(run.place.body) in self.machine.recursive
