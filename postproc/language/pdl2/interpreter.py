@@ -94,9 +94,7 @@ class Pdl2Machine(Machine):
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if text:
-            invalidate_names(here, words_in(text), _why_unknown(here))
-            if not _is_harmless(here, text):
-                _forget_by_text(here, _why_unknown(here))
+            _forget_by_text(here, text, _forget_names(here, text))
         return state
 
     def evaluate(
@@ -239,33 +237,30 @@ def _cancel(here: Execution) -> None:
 
 def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
     """Forget all that unknown text could influence."""
-    why = _why_unknown(here)
-    invalidate_names(here, words_in(statement.text), why)
-    arrived = frozenset[int]()
+    why, arrived = _forget_names(here, statement.text), frozenset[int]()
     if _MOVES.match(statement.text):
         reason = Reason(Code.UNKNOWN_STATEMENT, "the move statement is not understood")
         goal = Goal(Meaning.UNKNOWN, reason=reason)
         form, come = MoveForm(Motion.JOINT), machine.predecessors(here)
         arrival = single(here, form, come, here.store.settings, goal)
         arrived = frozenset({machine.record(here, 1, arrival)})
-    if not _is_harmless(here, statement.text):
-        _forget_by_text(here, why)
+    if _forget_by_text(here, statement.text, why):
         here.store.last |= arrived
 
 
-def _why_unknown(here: Execution) -> str:
+def _forget_names(here: Execution, text: str) -> str:
+    """Forget what text names; return why it is not known."""
     line = here.place.program.lines.line(here.row)
-    return f"line {line}, which is not understood, may change it"
+    why = f"line {line}, which is not understood, may change it"
+    invalidate_names(here, words_in(text), why)
+    return why
 
 
-def _is_harmless(here: Execution, text: str) -> bool:
-    """Tell whether unknown text does nothing to the arm and calls no function."""
+def _forget_by_text(here: Execution, text: str, why: str) -> bool:
+    """Forget what only text that moves could change; tell whether it may move."""
     called = (here.world.is_function(here.place, name) for name in words_in(text))
-    return is_harmless(text) and not any(called)
-
-
-def _forget_by_text(here: Execution, why: str) -> None:
-    """Forget what only a statement that may move the arm could change."""
+    if is_harmless(text) and not any(called):
+        return False
     here.store.forget_surroundings(why)
     text = (
         "this statement is not understood: the position of the arm, its frames and "
@@ -273,6 +268,7 @@ def _forget_by_text(here: Execution, why: str) -> None:
         "until these are set again"
     )
     here.world.report(here.place.program, here.row, Code.MOTION_UNKNOWN, text)
+    return True
 
 
 def run_broken(machine: Machine, here: Execution) -> None:

@@ -72,16 +72,11 @@ class FilePoints:
         rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
         return rows
 
-    def keys(self) -> Iterator[str]:
-        """Go through the keys, in the order of the file."""
-        for name, row in self.entries.row.items():
-            if self.own[row]:
-                yield self.prefix + name
-
     def parts(self) -> Iterator[str]:
         """Go through the keys that may be elements or fields."""
         if self.entries.parts or any(c in self.prefix for c in "[."):
-            yield from self.keys()
+            own = (name for name, row in self.entries.row.items() if self.own[row])
+            yield from map(self.prefix.__add__, own)
 
     def position(self, row: int) -> Position:
         """Return the value of a point."""

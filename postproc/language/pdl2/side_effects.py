@@ -154,44 +154,38 @@ def _list_statements(
     return (program.lines.said[shape] for shape in shapes.tolist())
 
 
+_END = ir.Leave("exitcycle")
+
+
 @lru_cache(maxsize=8192)
 def _direct(statement: ir.SourceStatement) -> Effects:
-    assigned: set[str] = set()
-    calls = {i.name for i in ir.calls_in(statement)}
-    moves = False
-    action = ast.action(statement)
-    ends = isinstance(action, ast.CancelMove) or action == ir.Leave("exitcycle")
-    cancels = frozenset([action] if action and ends else [])
-    if then := ast.behind(statement):
-        inner = _direct(then)
-        moves, assigned = inner.moves, set(inner.assigned)
-        calls |= inner.calls
-    match statement:
-        case ast.Move():
-            moves = True
-        case ir.NotUnderstood(text):
-            moves, assigned = True, set(words_in(text))
-            if not is_harmless(text):
-                assigned |= {f"${frame}" for frame in FRAMES}
-        case ir.Assignment(target):
-            assigned.add(_name_assigned(target))
-        case ir.ForLoop(name):
-            assigned.add(name)
-        case ast.Transfer(word, operands) if word != "WRITE":
-            assigned |= {_name_assigned(o) for o in list_changed_arguments(operands)}
-        case ir.Instruction(name):
-            calls.add(name)
-            changed = list_changed_arguments(statement.values)
-            assigned |= {_name_assigned(a) for a in changed}
-    for call in ir.calls_in(statement):
-        if call.name not in PURE:
-            changed = list_changed_arguments(call.values)
-            assigned |= {_name_assigned(a) for a in changed}
-    if TRACKING in calls:
+    chain, calls, assigned = [statement], ir.calls_in(statement), set[str]()
+    while (then := ast.behind(chain[-1])) is not None:
+        chain.append(then)
+    called = {call.name for call in calls}
+    changed = [a for call in calls if call.name not in PURE for a in call.values]
+    for one in chain:
+        match one:
+            case ir.NotUnderstood(text):
+                assigned |= words_in(text)
+                assigned |= set() if is_harmless(text) else {f"${f}" for f in FRAMES}
+            case ir.Assignment(target):
+                changed.append(target)
+            case ir.ForLoop(name):
+                assigned.add(name)
+            case ast.Transfer(word, operands) if word != "WRITE":
+                changed += operands
+            case ir.Instruction(name):
+                called.add(name)
+                changed += one.values
+    assigned.update(map(_name_assigned, list_changed_arguments(tuple(changed))))
+    if TRACKING in called:
         assigned.add(f"${TRACKING}")
-    read = frozenset(reference.name for reference in ir.data_in(statement))
-    called = frozenset(calls - PURE - CHANGING)
-    return Effects(moves, frozenset(assigned), read, called, cancels)
+    moves = any(isinstance(one, ast.Move | ir.NotUnderstood) for one in chain)
+    read = frozenset(data.name for data in ir.data_in(statement))
+    ends = (one for one in chain[-1:] if isinstance(one, ast.CancelMove) or one == _END)
+    called -= PURE | CHANGING
+    return Effects(moves, frozenset(assigned), read, frozenset(called), frozenset(ends))
 
 
 def _name_assigned(reference: ir.DataObject) -> str:
