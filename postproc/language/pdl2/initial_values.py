@@ -20,7 +20,7 @@ from postproc.language.pdl2.abstract_state import (
 )
 from postproc.language.pdl2.entries import POSITIONS, Entries
 from postproc.language.pdl2.evaluate import Execution
-from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
+from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.machine import (
     OTHERS_WRITE,
 )
@@ -248,12 +248,13 @@ def _enter_all(world: World, place: Place, file: VariableFile) -> None:
         key = world.root(place, root) + name[len(root) :]
         arm = world.other_arm(place, root)
         _enter(world, file, row, key, arm)
-    prefix = f"{place.program.name}/"
-    world.initial.points = FilePoints(
-        prefix, own, entries, base, shared, taught, np.zeros(len(own), bool)
-    )
+    initial = world.initial
+    initial.prefix = f"{place.program.name}/"
+    initial.entries, initial.base, initial.own = entries, base, own
+    initial.shared, initial.taught = shared, taught
+    initial.used = np.zeros(len(own), bool)
     for key, row in exported.items():
-        world.initial[key] = world.initial.points.position(row)
+        initial[key] = initial.position(row)
 
 
 def _list_rows_where(

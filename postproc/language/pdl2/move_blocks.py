@@ -464,8 +464,7 @@ def _points(
             if isinstance(value, Nothing):
                 here.world.pin(value, UNSURE)
             point[at], goals[at] = HELD, from_value(value)
-    if initial.points is not None:
-        initial.points.asked[point[point >= 0]] = True
+    initial.used[point[point >= 0]] = True
     return point, goals
 
 

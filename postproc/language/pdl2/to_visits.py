@@ -293,10 +293,8 @@ class Pdl2Collector(Collector):
 
     def _names(self, moves: ProgramMoves) -> None:
         """Enter the names of the points that moves go to."""
-        points, names = self.machine.world.initial.points, NameColumn()
         at = np.flatnonzero(moves.point >= 0)
-        if points is not None and len(at):
-            names = points.entries.name.take(moves.point[at])
+        names = self.machine.world.initial.entries.name.take(moves.point[at])
         told = {
             k: goal.position.name
             for k, _, goal in moves.list_evaluated()
@@ -311,9 +309,9 @@ class Pdl2Collector(Collector):
 
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
-        points = self.machine.world.initial.points
+        points = self.machine.world.initial
         some = np.flatnonzero(moves.point >= 0)
-        if points is None or len(some) == 0:
+        if len(some) == 0:
             return
         c, entries = self.columns, points.entries
         rows, visit = moves.point[some], moves.visit[some]
@@ -480,9 +478,9 @@ def _most_axes(runs: list[MoveRun], world: World) -> int:
     """Return the last auxiliary axis that targets give a value of."""
     goals = (goal.position for run in runs for goal in run.goals.values())
     axes = {axis for p in goals if p is not None for axis, _ in p.aux or ()}
-    points = world.initial.points
-    if points is not None and runs:
+    entries = world.initial.entries
+    if entries.layouts and runs:
         rows = np.concatenate([run.point for run in runs])
-        used: list[int] = np.unique(points.entries.layout[rows[rows >= 0]]).tolist()
-        axes |= {axis for k in used for axis in points.entries.layouts[k].axes}
+        used: list[int] = np.unique(entries.layout[rows[rows >= 0]]).tolist()
+        axes |= {axis for k in used for axis in entries.layouts[k].axes}
     return max([0, *(min(axis, MOST_AXES) for axis in axes)])
