@@ -40,6 +40,16 @@ def _add(node: Node, found: list[Node]) -> None:
     found.append(node)
 
 
+def calls_in(*nodes: Node | None) -> list[FunctionCall]:
+    """List the calls of functions in nodes, inner ones first."""
+    return [part for part in walk(*nodes) if isinstance(part, FunctionCall)]
+
+
+def data_in(*nodes: Node | None) -> list[DataObject]:
+    """List the data that nodes name."""
+    return [part for part in walk(*nodes) if isinstance(part, DataObject)]
+
+
 # Expressions, with number slots.
 #
 # A `Num` knows only which number of its statement it is, so that one expression serves

@@ -97,6 +97,9 @@ class Interpreter(ABC, Generic[S]):
         unrolled: Rows of loops that are followed round by round, all rounds together.
         steps: Statements that have been run.
         exhausted: The program has too many ways to be followed to the end.
+        visits: Arrivals by number; what follows each other and is alike has one number,
+            which as an origin means the last of it.
+        keys: Context, row and number within the row of each.
         paused: Visits behind which the arm may stop before the program goes on.
         lost: Visits behind which it may go anywhere.
     """
@@ -108,6 +111,8 @@ class Interpreter(ABC, Generic[S]):
     unrolled: int = 0
     steps: int = 0
     exhausted: bool = False
+    visits: list[Any] = field(default_factory=list)
+    keys: list[tuple[Context, int, int]] = field(default_factory=list)
     paused: set[int] = field(default_factory=set)
     lost: set[int] = field(default_factory=set)
     _heap: list[tuple[Point, int]] = field(default_factory=list)
@@ -433,6 +438,13 @@ class Interpreter(ABC, Generic[S]):
         call = context.call
         if call.kind == CALLED and call.outer.place is not None:
             self.go_on(call.begun_at.behind, state)
+
+    # Arrivals.
+
+    def find_unsure_stops(self) -> set[int]:
+        """Return the visits at which it is not known whether the arm stops."""
+        leads = set[int]().union(*(visit.origins for visit in self.visits))
+        return {k for k in self.lost | (self.paused & leads) if k >= 0}
 
 
 def calls_around(context: Context) -> Iterator[Context]:

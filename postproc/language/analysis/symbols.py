@@ -510,8 +510,7 @@ class TaskSymbols(ABC, Generic[F]):
             return False
         scope, text = self.scope_of(found), self.files[found.file].text
         said = [text.statement(row) for row in found.inside]
-        parts = [one for one in ir.walk(*said) if isinstance(one, ir.DataObject)]
-        places = (self.place(one.name, scope) for one in parts)
+        places = (self.place(one.name, scope) for one in ir.data_in(*said))
         return all(place is not None and place[2] for place in places)
 
     def value(

@@ -118,8 +118,10 @@ class TaskLanguage(Language):
         """Read the files of a job and follow it, see `Language.read`."""
         task = self.parse(sources, start, known)
         machine = follow(self.machine, task, start)
-        visits = self.collector(machine).collect()
-        missed = machine.find_unreached()
+        collector = self.collector(machine)
+        visits = collector.collect()
+        own = (f.moves[: 0 if f.is_system else None] for f in task.files)
+        missed = collector.find_unreached(own)
         machine.root.forget()
         quiet = [f for f in task.files if f.is_system and not self.tells_system]
         odd = (d for f in task.files if f not in quiet for d in f.diagnostics)

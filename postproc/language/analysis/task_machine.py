@@ -12,7 +12,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, all_in_rows
+from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
@@ -154,10 +154,7 @@ class TaskMachine(Interpreter[Arrived]):
         passed: Statements that lead to the next one and do nothing.
         task: What its names mean.
         start: What the cell says.
-        visits: Arrivals by number.
-        keys: Context, row and number within the row of each.
         diagnostics: What else was found.
-        reached: Which statements of each file are moves that some way leads to.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
         at_once: Moves that differ only in where they go are read at once.
@@ -168,10 +165,7 @@ class TaskMachine(Interpreter[Arrived]):
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     task: TaskSymbols[Any] = field(kw_only=True)
     start: Start = field(kw_only=True)
-    visits: list[Any] = field(default_factory=list)
-    keys: list[tuple[Context, int, int]] = field(default_factory=list)
     diagnostics: set[Diagnostic] = field(default_factory=set)
-    reached: list[Bools] = field(init=False)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
@@ -186,9 +180,6 @@ class TaskMachine(Interpreter[Arrived]):
     _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
         default_factory=dict
     )
-
-    def __post_init__(self) -> None:
-        self.reached = [np.zeros(len(text), dtype=bool) for text in self.texts]
 
     @cached_property
     def texts(self) -> Sequence[StatementText[Any]]:
@@ -380,7 +371,6 @@ class TaskMachine(Interpreter[Arrived]):
         after = self.act(at, at.statement, state)
         (number,) = self._numbers[at]
         self.visits[number].count = behind - at.row
-        self.reached[at.place.scope.file][at.row : behind] = True
         return behind, after
 
     def before(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived:
@@ -590,7 +580,6 @@ class TaskMachine(Interpreter[Arrived]):
             one: What it says.
             here: How the arm comes to it.
         """
-        self.reached[at.place.scope.file][at.row] = True
         known = self._numbers.get(at)
         if known is None:
             found = [*self.read_visits(one, scope_at(at), here)]
@@ -659,11 +648,6 @@ class TaskMachine(Interpreter[Arrived]):
         """Return visits; of those not distinguished, all that there may be."""
         every = origins | self.lost if MANY in origins else origins
         return {k for k in every if k >= 0}
-
-    def find_unsure_stops(self) -> set[int]:
-        """Return the visits at which it is not known whether the arm stops."""
-        leads = set[int]().union(*(visit.origins for visit in self.visits))
-        return self.lost | (self.paused & leads)
 
     def unknown(self, at: At, here: Arrived, what: str = NOT_FOLLOWED) -> Arrived:
         """Say that a statement may move, and forget what was known."""
@@ -786,18 +770,6 @@ class TaskMachine(Interpreter[Arrived]):
         for row in range(first, behind):
             for at, _, one in self.calls_of(self.texts[file].statement(row)):
                 yield at, one.first, one.last
-
-    def find_unreached(self) -> dict[str, Ints]:
-        """Return the lines of moves that no way leads to, by file."""
-        found = {}
-        for number, file in enumerate(self.task.files):
-            if file.is_system:
-                continue
-            text, missed = file.text, file.moves[~self.reached[number][file.moves]]
-            if len(missed):
-                lines = np.unique(text.begin_line[missed]).astype(np.int64)
-                found[text.source.name] = lines
-        return found
 
 
 def scope_at(at: At, here: Arrived | None = None) -> Scope:

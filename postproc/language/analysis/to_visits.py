@@ -33,7 +33,7 @@ from postproc.language.analysis.found_visits import (
     whole_name,
 )
 from postproc.language.analysis.move_runs import within
-from postproc.language.analysis.origins import number_origins
+from postproc.language.analysis.origins import Origins, number_origins
 from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
@@ -45,7 +45,7 @@ from postproc.language.analysis.visit_columns import (
 )
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import MEASURE
-from postproc.language.text.statement_table import StatementText
+from postproc.language.text.statement_table import Statements, StatementText
 
 ONLY_SHIFTED = Reason(
     Code.NUMBERS_NOT_OWN,
@@ -112,27 +112,103 @@ BESIDE = (
 )
 
 
-class TaskCollector(ABC):
-    """Makes visits, n, of what a machine has found, r, in the order of the program.
+class Collector:
+    """Sorts what a machine has found, r, in the order of the program: n visits.
+
+    Attributes:
+        machine: It has followed all ways.
+        texts: All files.
+        found: What it has found.
+        counts, begin: How many visits each stands for, and the first of them, (r,).
+        last: The last of them, by the number that the machine knows it by, (r,).
+        numbering: The numbers of all files.
+    """
+
+    def __init__(self, machine: Any, texts: Iterable[Statements[Any]]) -> None:
+        """Sort what was found."""
+        self.machine, self.texts = machine, [*texts]
+        keys = [(Point(context, at), k) for context, at, k in machine.keys]
+        order = sorted(range(len(keys)), key=keys.__getitem__)
+        self.found: list[Any] = [machine.visits[k] for k in order]
+        self.counts = np.array([one.count for one in self.found], np.int64)
+        self.begin = np.cumsum(self.counts) - self.counts
+        self.last = np.empty(len(order), np.int64)
+        self.last[order] = self.begin + self.counts - 1
+        pairs = [(text.source, text.numbers) for text in self.texts]
+        self.numbering = Numbering.of(pairs)
+
+    def origins_of(self, one: Any) -> Origins:
+        """Return where the arm may come from before what was found."""
+        found: Origins = one.origins
+        return found
+
+    def graph(self) -> visits.Graph:
+        """Translate origins to visits in the order of the program."""
+        every = map(self.origins_of, self.found)
+        origins = [number_origins(one, self.last) for one in every]
+        return chain_visits(self.counts, origins)
+
+    def rows_of(self, one: Any) -> tuple[int, slice | Ints]:
+        """Return the file of what was found, and the rows of its moves there."""
+        return one.scope.file, slice(one.row, one.row + one.count)
+
+    def find_unreached(self, moves: Iterable[Indices]) -> dict[str, Ints]:
+        """Return the lines of moves that no way leads to, ascending, by file.
+
+        Args:
+            moves: Rows of the moves of every file.
+        """
+        missed = [np.zeros(len(text), bool) for text in self.texts]
+        for own, rows in zip(missed, moves, strict=False):
+            own[rows] = True
+        for file, visited in map(self.rows_of, self.found):
+            missed[file][visited] = False
+        lines = (
+            np.unique(t.begin_line[own])
+            for t, own in zip(self.texts, missed, strict=True)
+        )
+        found = zip(self.files, lines, strict=True)
+        return {name: own.astype(np.int64) for name, own in found if len(own)}
+
+    @property
+    def files(self) -> list[str]:
+        """The names of the files."""
+        return [text.source.name for text in self.texts]
+
+
+def find_measured(
+    marks: Iterable[tuple[int, str]], lines: Indices, rows: Indices
+) -> dict[int, str]:
+    """Return the ids of moves that are measured, by their rows.
+
+    Args:
+        marks: Lines that begin with MEASURE, and the ids there.
+        lines: Up to which a mark may stand before a move, or on it, ascending, (m,).
+        rows: The moves, (m,).
+    """
+    found = dict[int, str]()
+    for line, mark in marks:
+        at = int(np.searchsorted(lines, line))
+        if at < len(rows):
+            found.setdefault(int(rows[at]), mark)
+    return found
+
+
+class TaskCollector(Collector, ABC):
+    """Makes visits of what the machine of a task has found.
 
     Attributes:
         dialect: What the numbers mean.
-        machine: It has followed all ways.
     """
 
     dialect: ClassVar[Dialect]
+    machine: TaskMachine
+    found: list[FoundVisit]
 
     def __init__(self, machine: Any) -> None:
-        """Sort what was found; what counts for several is filled for all of them."""
-        self.machine: TaskMachine = machine
-        keys = [(Point(context, at), k) for context, at, k in machine.keys]
-        self.order = sorted(range(len(keys)), key=keys.__getitem__)
-        self.found: list[FoundVisit] = [machine.visits[k] for k in self.order]
-        self.counts = np.array([v.count for v in self.found], np.int64)
-        self.begin = np.cumsum(self.counts) - self.counts  # the first visit of each
+        """Find what counts for several: it is filled for all of them."""
+        super().__init__(machine, machine.texts)
         self.owner, self.inside = within(self.counts)  # of each visit: (n,)
-        texts = [(text.source, text.numbers) for text in machine.texts]
-        self.numbering = Numbering.of(texts)
         first = dict[tuple[int, int], int]()  # by the numbers that moves write
         for k, v in enumerate(self.found):
             file, slots = v.goal.writes
@@ -162,8 +238,8 @@ class TaskCollector(ABC):
         self._hold_for_taught(pinned)
         return to_visits(
             c,
-            [text.source.name for text in machine.texts],
-            self._graph(),
+            self.files,
+            self.graph(),
             self._pin(literals, literal, pinned),
             literal,
             own[np.maximum(followed, -1)][self.owner],
@@ -242,28 +318,17 @@ class TaskCollector(ABC):
 
     def _read_measure_ids(self) -> dict[int, str]:
         """Return the ids that comments give to visits."""
-        ids, task = dict[tuple[int, int], str](), self.machine.task
-        for number, file in enumerate(task.files):
+        ids, task = list[dict[int, str]](), self.machine.task
+        for file in task.files:
             text, rows = file.text, file.moves
             marks = [*task.comments.marks(text.source, MEASURE)]
             last = text.source.lines_of(text.end[rows]) if marks else rows
-            for line, mark in marks:
-                at = int(np.searchsorted(last, line))
-                if at < len(rows):
-                    ids.setdefault((number, int(rows[at])), mark)
-        if not ids:
+            ids.append(find_measured(marks, last, rows))
+        if not any(ids):
             return {}
         each = ((v, k) for v in self.found for k in range(v.count))
-        own = ("" if v.via else ids.get((v.scope.file, v.row + k), "") for v, k in each)
+        own = ("" if v.via else ids[v.scope.file].get(v.row + k, "") for v, k in each)
         return {visit: mark for visit, mark in enumerate(own) if mark}
-
-    def _graph(self) -> visits.Graph:
-        """Translate origins to visits in program order: they end a run."""
-        ends = self.begin + self.counts - 1
-        last = np.empty(len(ends), np.int64)
-        last[self.order] = ends
-        origins = [number_origins(v.origins, last) for v in self.found]
-        return chain_visits(self.counts, origins)
 
     def _pin(
         self, literals: visits.Literals, literal: Indices, pinned: Sequence[str]

@@ -13,7 +13,7 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.modal_state import ModalState
 from postproc.language.analysis.symbols import whole
-from postproc.language.analysis.values import KnownRecord, Value
+from postproc.language.analysis.values import KnownRecord
 from postproc.language.krl import symbols
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import (
@@ -53,13 +53,13 @@ class KrlModes(ModalState):
         through: Arcs of the spline planner take the tool through the orientation of
             their points (``$CIRC_MODE``).
         ahead: ``$ADVANCE`` is not 0; None where that is not known.
-        fdat, pdat, ldat: ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
         halted: The arm has stopped since the last move; None where that is not known.
         goes_on: ``CONTINUE`` stands before.
         load: What the arm carries, as the program states it: mass [kg], and its centre
             in the flange frame [m] where that is known; `CELL_LOAD` where it states
             nothing, `LOST_LOAD` where what it states is not known.
-        store: What the program has set of tables, corrections and switches.
+        store: What the program has set of tables, corrections and switches, and of
+            ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
         perhaps: The next statement is skipped where an error comes up in it.
         declared: Interrupts that may move the arm or end its moves, by number, and why
             targets are left while one of them is on.
@@ -78,9 +78,6 @@ class KrlModes(ModalState):
     circle: str = ""
     through: bool = False
     ahead: bool | None = True
-    fdat: Value | None = None
-    pdat: Value | None = None
-    ldat: Value | None = None
     halted: bool | None = False
     goes_on: bool = False
     load: tuple[float, ...] = CELL_LOAD
@@ -100,8 +97,15 @@ class KrlModes(ModalState):
 
     def hold(self, name: str, value: object | None) -> KrlModes:
         """Return it with what the program sets a name to; None forgets it."""
+        if self.store.get(name) is value:
+            return self
         store = {k: v for k, v in self.store.items() if k != name}
         return replace(self, store=store if value is None else store | {name: value})
+
+    def record(self, name: str) -> KnownRecord:
+        """Return the components that the program has set a name to, as far as known."""
+        held = self.store.get(name)
+        return held if isinstance(held, KnownRecord) else KnownRecord((), whole=False)
 
     def drop(self, name: str) -> KrlModes:
         """Forget what the program has set a name, or any entry of a table, to."""
@@ -171,6 +175,10 @@ _WORDS = {
     "$circ_type": ("circle", "circ_typ"),
 }
 """Variables that are set to words: modes, and components of data with such a word."""
+_PARTS: Mapping[str, Mapping[str, str]] = {
+    "$vel": {"cp": "speed"}, "$apo": {"cdis": "distance", "cptp": "overlap"},
+}  # fmt: skip
+"""Variables that are set to numbers: components, and the modes that they are."""
 # System variables that change nothing of where targets are and from which side they are
 # reached; those in the first list do not stop what is planned ahead either.
 PLANNED = frozenset(
@@ -269,8 +277,7 @@ class ModeReader:
 
     def _assign(self, modes: KrlModes, one: ir.Assignment) -> KrlModes | None:
         """Carry an assignment out where nothing runs beside the program."""
-        parts = ir.walk(one.value)
-        called = [part.name for part in parts if isinstance(part, ir.FunctionCall)]
+        called = [call.name for call in ir.calls_in(one.value)]
         own = next((name for name in called if name in self.task.routines), "")
         if own:  # it gives a value, and is not followed
             one = replace(one, value=ir.FunctionCall(f"{own} of the files", ()))
@@ -370,12 +377,10 @@ class ModeReader:
 
     def _hold_component(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
-        name = one.target.name.removesuffix("_act")
-        own = not self.task.is_global(one.target.name, self.here)
-        if one.target.steps or own or one.target.name in self.task.beside:
-            return modes.with_(**{name: None})
-        found = self.task.value(one.value, self.here)
-        return modes.with_(**{name: found})
+        name, steps = one.target.name, one.target.steps
+        known = self.task.is_global(name, self.here) and name not in self.task.beside
+        found = self.task.value(one.value, self.here) if known and not steps else None
+        return modes.hold(name, found)
 
     def _number(self, operand: ir.Operand | None) -> float:
         return self.task.number(operand, self.here)
@@ -412,42 +417,24 @@ class ModeReader:
 
     def _speed(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``$VEL.CP``, ``$VEL_AXIS[i]``, ``$APO.CDIS``, all of ``$VEL`` or ``$APO``."""
-        name, step = one.target.name, (*one.target.steps, "")[0]
-        number = number_or_unknown(self._number(one.value))
-        match name, step:
-            case "$vel", "cp":
-                return modes.with_(speed=number)
-            case "$vel", "":
-                speed = self._record(one.value).number("cp")
-                if isinstance(one.value, ir.FunctionCall):  # SVEL_CP(2, , LCPDAT1)
-                    speed = self._number(self._argument(one.value))
-                return modes.with_(speed=number_or_unknown(speed))
-            case "$vel_axis", ir.ElementStep():
-                inside = self._argument(one.value)
-                percent = (
-                    number
-                    if inside is None
-                    else number_or_unknown(self._number(inside))
-                )
-                return modes.with_(share=percent / 100.0 if percent > 0 else UNKNOWN)
-            case "$apo", "cdis":
-                return modes.with_(distance=number)
-            case "$apo", "cptp":
-                return modes.with_(overlap=number)
-            case "$apo", "":
-                return self._blending(modes, one.value)
-        return modes
-
-    def _blending(self, modes: KrlModes, operand: ir.Operand) -> KrlModes:
-        """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
-        if isinstance(operand, ir.FunctionCall):
-            held = self._record(self._argument(operand))
-            return modes.with_(distance=number_or_unknown(held.number("apo_dist")))
-        found = self._record(operand)
-        return modes.with_(
-            distance=number_or_unknown(found.number("cdis")),
-            overlap=number_or_unknown(found.number("cptp")),
-        )
+        name, value, step = one.target.name, one.value, (*one.target.steps, "")[0]
+        given, parts = self._argument(value), _PARTS.get(name, {})
+        found = dict[str, float]()
+        if name == "$vel_axis":
+            if isinstance(step, ir.ElementStep):
+                percent = self._number(value if given is None else given)
+                return modes.with_(share=_share(percent))
+        elif step in parts:
+            found = {str(step): self._number(value)}
+        elif step == "" and not isinstance(value, ir.FunctionCall):
+            record = self._record(value)
+            found = {part: record.number(part) for part in parts}
+        elif step == "" and name == "$vel":  # SVEL_CP(2, , LCPDAT1)
+            found = {"cp": self._number(given)}
+        elif step == "":  # SAPO(LCPDAT1), SAPO_PTP(PPDAT1)
+            found = {"cdis": self._record(given).number("apo_dist")}
+        changed = {parts[part]: number_or_unknown(x) for part, x in found.items()}
+        return modes.with_(**changed)
 
     def _load(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``$LOAD = LOAD_DATA[n]``, ``$LOAD = SLOAD(n)``, ``$LOAD.M = 50``."""
@@ -561,8 +548,7 @@ class ModeReader:
 
     def _frames(self, modes: KrlModes) -> KrlModes:
         """Take the frames of FDAT_ACT, and the load of its tool."""
-        held = modes.fdat if isinstance(modes.fdat, KnownRecord) else KnownRecord(())
-        reader = self.frames(modes)
+        held, reader = modes.record("fdat_act"), self.frames(modes)
         found = {
             name[1:]: reader.read_numbered(name, held.number(field))
             for name, field in NUMBERS.items()
@@ -576,7 +562,7 @@ class ModeReader:
 
     def _joint_data(self, modes: KrlModes) -> KrlModes:
         """Take the blending of PDAT_ACT."""
-        held = modes.pdat if isinstance(modes.pdat, KnownRecord) else KnownRecord(())
+        held = modes.record("pdat_act")
         size = number_or_unknown(held.number("apo_dist"))
         if held.get("apo_mode") == "#cdis":
             return modes.with_(distance=size, overlap=UNKNOWN)
@@ -584,8 +570,7 @@ class ModeReader:
 
     def _path_data(self, modes: KrlModes) -> KrlModes:
         """Take blending and orientation of LDAT_ACT."""
-        lost = KnownRecord((), whole=False)
-        held = modes.ldat if isinstance(modes.ldat, KnownRecord) else lost
+        held = modes.record("ldat_act")
         word, circle = held.get("ori_typ"), held.get("circ_typ")
         if held.whole and circle is None:  # which may be left out
             circle = self._default_circle

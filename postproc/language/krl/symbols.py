@@ -23,6 +23,7 @@ from postproc.language.krl import syntax as said
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.text.symbol_column import read_names
 
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
@@ -104,7 +105,6 @@ FUNCTIONS = frozenset(
 )
 # Routines of packages that are known neither to move the arm nor to set frames.
 
-_LIST = Path(__file__).with_name("still_routines.txt")
 AHEAD = "ahead"
 ASSUMED = (
     "is not in the available files: it is on the list of routines known neither to "
@@ -120,9 +120,7 @@ def package_routines() -> Mapping[str, str]:
     >>> package_routines()["set_cd_params"], package_routines()["h50"]
     ('ahead', '')
     """
-    lines = (line.partition("#")[0] for line in _LIST.read_text("ascii").splitlines())
-    words = (line.split() for line in lines if line.strip())
-    return {name: " ".join(rest) for name, *rest in words}
+    return read_names(Path(__file__).with_name("still_routines.txt"))
 
 
 KEEPING = ((STILL - WRITING) | FUNCTIONS | package_routines().keys()) | {"bas"}

@@ -177,12 +177,8 @@ class Store:
     def join(self, other: Store) -> Store:
         """Return what may hold on either way; itself where the other adds nothing."""
         both = self.copy()
-        return both if both.merge(other) else self
-
-    def merge(self, other: Store) -> bool:
-        """Take in what may hold too; tell whether anything changed."""
         last = join_origins(self.last, other.last, self.lost)
-        changed, self.last = last is not self.last, last
+        changed, both.last = last is not self.last, last
         if other.settings is not self.settings and other.settings != self.settings:
             a, b, unset = (
                 self.settings,
@@ -191,7 +187,7 @@ class Store:
             )
             merged = {n: join(a.get(n, unset), b.get(n, unset)) for n in {**a, **b}}
             changed |= merged != self.settings
-            self.settings = merged
+            both.settings = merged
         found = []  # before anything is written: an array hides its elements
         for key in self.values.differing(other.values):
             mine, theirs = self.values.get(key), other.values.get(key)
@@ -201,8 +197,8 @@ class Store:
                 found.append((key, before, after))
         for key, before, after in found:
             changed |= after != before
-            self.write(key, after)
-        return changed
+            both.write(key, after)
+        return both if changed else self
 
 
 def root_of(key: str) -> str:

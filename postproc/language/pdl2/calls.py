@@ -15,6 +15,7 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.conditions import DISTURBING
 from postproc.language.pdl2.evaluate import (
+    Execution,
     bare,
     copy_parts,
     fill,
@@ -24,7 +25,6 @@ from postproc.language.pdl2.evaluate import (
 )
 from postproc.language.pdl2.job import Place
 from postproc.language.pdl2.machine import (
-    Execution,
     Machine,
     escape_names,
     invalidate,
@@ -34,7 +34,7 @@ from postproc.language.pdl2.machine import (
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.values import (
     Alias,
-    Location,
+    Component,
     Nothing,
     Position,
     SourceNumber,
@@ -300,63 +300,53 @@ def frame_value(record: Record, why: str) -> Position | Nothing:
 
 def assign(here: Execution, statement: ir.Assignment, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
-    other = here.world.other_arm(here.place, statement.target.name)
-    if other:
-        here.world.pin(here.value(statement.value), f"arm {other} goes to it too")
-        for key in here.locate(statement.target).keys:
+    reference, new, name = statement.target, statement.value, statement.target.name
+    if other := here.world.other_arm(here.place, name):
+        here.world.pin(here.value(new), f"arm {other} goes to it too")
+        for key in here.locate(reference).keys:
             invalidate_key(here, key, points_of(other))
         return
-    new = statement.value
-    if _assign_component(here, statement.target, new):
+    if name.startswith("$"):
+        _setting(here, reference, _value(here, new, taught), taught)
         return
-    if not statement.target.name.startswith("$") and copy_parts(
-        here, new, statement.target
-    ):
+    target = here.locate(reference)
+    if target.exact and target.number >= 0:
+        part = here.read_number(new)
+        held = _position(here, name, target.key).with_component(target.number, part)
+        here.store.write(target.key, set_owner(here, name, target.key, held))
         return
-    value = here.value(new)
-    if taught and isinstance(value, Position):
-        value = replace(value, taught=True)
-    if statement.target.name.startswith("$"):
-        part = here.frame_part(statement.target)
-        if part is None:
-            _setting(here, statement.target, value)
-        else:
-            _frame_part(here, *part, value, taught)
+    if copy_parts(here, new, reference):
         return
-    target = here.locate(statement.target)
+    value = _value(here, new, taught)
     if not target.exact:
         for key in target.keys:
             invalidate_key(here, key, "an element known only at run time is assigned")
         return
-    held = _new_value(here, statement, target, value)
-    if isinstance(held, Position):
-        held = set_owner(here, statement.target.name, target.key, held)
-    if isinstance(held, Nothing) and target.component == ():
-        here.store.forget(target.key, held)
+    if target.component != ():
+        value = _with_part(_position(here, name, target.key), target.component, value)
+    if isinstance(value, Position):
+        value = set_owner(here, name, target.key, value)
+    if isinstance(value, Nothing) and target.component == ():
+        here.store.forget(target.key, value)
     else:
-        here.store.write(target.key, held)
+        here.store.write(target.key, value)
 
 
-def _assign_component(
-    here: Execution, reference: ir.DataObject, value: ir.Operand
-) -> bool:
-    """Replace a number of a position; return False where a reference is none."""
-    if reference.name.startswith("$"):
-        return False
-    target = here.locate(reference)
-    if not target.exact or target.number < 0:
-        return False
-    new = here.read_number(value)
-    held = here.store.read(target.key)
-    if not isinstance(held, Position):
-        held = _blank(here, reference.name, held)
-    held = held.with_component(target.number, new)
-    here.store.write(target.key, set_owner(here, reference.name, target.key, held))
-    return True
+def _value(here: Execution, expression: ir.Operand, taught: bool) -> Value:
+    """Return what an expression is worth, a position marked as taught if it is."""
+    value = here.value(expression)
+    if taught and isinstance(value, Position):
+        return replace(value, taught=True)
+    return value
 
 
-def _setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
-    """Change a frame or motion variable of our arm."""
+def _setting(
+    here: Execution, reference: ir.DataObject, value: Value, taught: bool
+) -> None:
+    """Change a frame or motion variable of our arm, or one number of a frame."""
+    if (frame := here.frame_part(reference)) is not None:
+        _frame_part(here, *frame, value, taught)
+        return
     name = here.setting_name(reference)
     if name is None:
         part = reference.name[1:]
@@ -412,28 +402,24 @@ def _whose(here: Execution, reference: ir.DataObject) -> int | None:
     return 0
 
 
-def _new_value(
-    here: Execution, statement: ir.Assignment, target: Location, value: Value
-) -> Value:
-    if target.component == ():
-        return value
-    held = here.store.read(target.key)
-    if not isinstance(held, Position):
-        held = _blank(here, statement.target.name, held)
-    number = value if isinstance(value, float) else None
-    match target.component:
+def _with_part(held: Position, component: Component, value: Value) -> Value:
+    """Return a position of which a part is set that is none of its six numbers."""
+    match component:
         case "pos":
             if not isinstance(value, Position):
                 known = isinstance(value, Nothing)
                 return value if known else Nothing("it is no position")
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
-            return held.with_aux(axis, number)
+            return held.with_aux(axis, value if isinstance(value, float) else None)
     return Nothing("a part of it known only at run time is assigned")
 
 
-def _blank(here: Execution, name: str, held: Value) -> Position:
-    """Return a position of which nothing is known yet."""
+def _position(here: Execution, name: str, key: str) -> Position:
+    """Return the position that a variable holds, one of which nothing is known else."""
+    held = here.store.read(key)
+    if isinstance(held, Position):
+        return held
     type_ = here.world.type_of(here.place, name)
     joints = type_ is not None and type_.name == "jointpos"
     never = isinstance(held, Nothing) and held.code is Code.NO_VALUE

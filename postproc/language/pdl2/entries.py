@@ -167,6 +167,13 @@ class Entries:
         return tuple(zip(axes, _numbers_or_none(self.aux[row]), strict=False))
 
 
+_NO = np.empty(0, np.int32)
+NO_ENTRIES = Entries(
+    Rows(NameColumn(), _NO), NameColumn(), np.empty(0, np.int64), _NO, (),
+    np.empty((0, 6)), np.empty((0, 6), np.int32), np.empty((0, 0)), _NO,
+)  # fmt: skip
+
+
 def _numbers_or_none(values: Floats) -> tuple[float | None, ...]:
     return tuple(None if value != value else value for value in values.tolist())
 

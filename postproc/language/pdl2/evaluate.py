@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-from postproc.diagnostics import Code
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
+from postproc.language.analysis.call_context import Context
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.values import (
@@ -41,14 +42,20 @@ _FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
 
 
 @dataclass
-class ProgramPoint:
-    """A place in the execution: where, and what is known there."""
+class Execution:
+    """A point of the execution: where, what is known there, and what led to it.
+
+    Attributes:
+        reason: Why nothing here may be compensated.
+    """
 
     world: World
     place: Place
     row: int
     store: Store
     volatile: frozenset[str] = frozenset()
+    context: Context = field(default_factory=Context)
+    reason: Reason = NO_REASON
 
     def report_once(self, code: Code, what: str, text: str) -> None:
         """Report something of a thing, at the row where it comes up first."""
@@ -339,7 +346,7 @@ SINGLE = frozenset(
 )
 
 
-def copy_parts(here: ProgramPoint, value: ir.Operand, target: ir.DataObject) -> bool:
+def copy_parts(here: Execution, value: ir.Operand, target: ir.DataObject) -> bool:
     """Let a variable hold the parts of another one; tell whether it has parts."""
     origin = bare(value)
     if origin is None:
@@ -369,7 +376,7 @@ def bare(value: ir.Operand | None) -> ir.DataObject | None:
     return value if named and isinstance(value, ir.DataObject) else None
 
 
-def parts_of(here: ProgramPoint, origin: ir.DataObject) -> dict[str, Value]:
+def parts_of(here: Execution, origin: ir.DataObject) -> dict[str, Value]:
     """Return what is known of the elements and fields of a variable.
 
     Where what they hold is not known, those count too that may be positions of the
@@ -388,13 +395,13 @@ def parts_of(here: ProgramPoint, origin: ir.DataObject) -> dict[str, Value]:
     return found
 
 
-def parts_under(here: ProgramPoint, key: str) -> list[str]:
+def parts_under(here: Execution, key: str) -> list[str]:
     """Return the keys of elements and fields that a key has or ever had."""
     world = here.world
     return world.first_parts(key) + world.later_parts(key) + here.store.parts(key)
 
 
-def invalidate_key(here: ProgramPoint, key: str, why: str) -> None:
+def invalidate_key(here: Execution, key: str, why: str) -> None:
     """Forget what a key and its parts hold: any of it may still be there."""
     if key in here.store.compound or here.world.first_parts(key):
         here.world.loosen(key, why)
@@ -402,7 +409,7 @@ def invalidate_key(here: ProgramPoint, key: str, why: str) -> None:
 
 
 def fill(
-    here: ProgramPoint, key: str, name: str, origin: str, parts: dict[str, Value]
+    here: Execution, key: str, name: str, origin: str, parts: dict[str, Value]
 ) -> None:
     """Let a key hold parts, and nothing else."""
     why = f"{origin}, of which it is a copy, has no value for it"
@@ -415,7 +422,7 @@ def fill(
         here.store.write(key + suffix, value)
 
 
-def set_owner(here: ProgramPoint, name: str, key: str, value: Position) -> Position:
+def set_owner(here: Execution, name: str, key: str, value: Position) -> Position:
     """Say which variable a literal is the value of."""
     declared = here.world.find_declaration(here.place, name)
     shared = value.shared or bool(declared and declared.exported)

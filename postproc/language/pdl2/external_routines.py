@@ -10,8 +10,7 @@ from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.program import Program
-
-_LIST = Path(__file__).with_name("still_routines.txt")
+from postproc.language.text.symbol_column import read_names
 
 _BUILT_IN = frozenset(
     "act_post array_dim1 array_dim2 bit_flip cond_disable cond_dsbl_all cond_enable "
@@ -50,8 +49,7 @@ def list_motionless() -> frozenset[str]:
     >>> "spot" in list_motionless(), "tf" in list_motionless()
     (True, False)
     """
-    lines = (line.partition("#")[0] for line in _LIST.read_text("ascii").splitlines())
-    return frozenset(filter(None, map(str.strip, lines)))
+    return frozenset(read_names(Path(__file__).with_name("still_routines.txt")))
 
 
 def effect_of(world: World, program: Program, name: str) -> RoutineEffect:

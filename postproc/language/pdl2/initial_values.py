@@ -19,8 +19,8 @@ from postproc.language.pdl2.abstract_state import (
     wholes,
 )
 from postproc.language.pdl2.entries import POSITIONS, Entries
-from postproc.language.pdl2.evaluate import ProgramPoint
-from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
+from postproc.language.pdl2.evaluate import Execution
+from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.machine import (
     OTHERS_WRITE,
 )
@@ -192,7 +192,7 @@ def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
         if why := _why_untrusted(world, key):
             world.initial[key] = Nothing(why)
             continue
-        value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
+        value = Execution(world, place, variable.row, store).value(variable.initial)
         if variable.arm not in (0, world.arm):
             value = Nothing(points_of(variable.arm))
         if isinstance(value, Position) and not value.name:
@@ -248,12 +248,13 @@ def _enter_all(world: World, place: Place, file: VariableFile) -> None:
         key = world.root(place, root) + name[len(root) :]
         arm = world.other_arm(place, root)
         _enter(world, file, row, key, arm)
-    prefix = f"{place.program.name}/"
-    world.initial.points = FilePoints(
-        prefix, own, entries, base, shared, taught, np.zeros(len(own), bool)
-    )
+    initial = world.initial
+    initial.prefix = f"{place.program.name}/"
+    initial.entries, initial.base, initial.own = entries, base, own
+    initial.shared, initial.taught = shared, taught
+    initial.used = np.zeros(len(own), bool)
     for key, row in exported.items():
-        world.initial[key] = world.initial.points.position(row)
+        initial[key] = initial.position(row)
 
 
 def _list_rows_where(

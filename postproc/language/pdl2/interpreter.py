@@ -6,6 +6,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from postproc.arrays import Ints
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
@@ -15,10 +18,10 @@ from postproc.language.language import Start
 from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
+from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.initial_values import fill_initial, keep_values
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
-    Execution,
     Goal,
     Machine,
     MoveForm,
@@ -32,6 +35,7 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.side_effects import (
     CallGraph,
+    has_target,
     is_harmless,
     list_changed_arguments,
     list_live,
@@ -39,7 +43,7 @@ from postproc.language.pdl2.side_effects import (
     names_but_ends,
     words_in,
 )
-from postproc.language.pdl2.to_visits import Collector
+from postproc.language.pdl2.to_visits import Pdl2Collector
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.visits import START, Diagnostic, Meaning, Visits
 from postproc.robot.trajectory import Motion
@@ -90,9 +94,7 @@ class Pdl2Machine(Machine):
         text = written.text if isinstance(written, ir.NotUnderstood) else ""
         prepare(self, here, one, text)
         if text:
-            invalidate_names(here, words_in(text), _why_unknown(here))
-            if not _is_harmless(here, text):
-                _forget_by_text(here, _why_unknown(here))
+            _forget_by_text(here, text, _forget_names(here, text))
         return state
 
     def evaluate(
@@ -235,33 +237,30 @@ def _cancel(here: Execution) -> None:
 
 def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> None:
     """Forget all that unknown text could influence."""
-    why = _why_unknown(here)
-    invalidate_names(here, words_in(statement.text), why)
-    arrived = frozenset[int]()
+    why, arrived = _forget_names(here, statement.text), frozenset[int]()
     if _MOVES.match(statement.text):
         reason = Reason(Code.UNKNOWN_STATEMENT, "the move statement is not understood")
         goal = Goal(Meaning.UNKNOWN, reason=reason)
         form, come = MoveForm(Motion.JOINT), machine.predecessors(here)
         arrival = single(here, form, come, here.store.settings, goal)
         arrived = frozenset({machine.record(here, 1, arrival)})
-    if not _is_harmless(here, statement.text):
-        _forget_by_text(here, why)
+    if _forget_by_text(here, statement.text, why):
         here.store.last |= arrived
 
 
-def _why_unknown(here: Execution) -> str:
+def _forget_names(here: Execution, text: str) -> str:
+    """Forget what text names; return why it is not known."""
     line = here.place.program.lines.line(here.row)
-    return f"line {line}, which is not understood, may change it"
+    why = f"line {line}, which is not understood, may change it"
+    invalidate_names(here, words_in(text), why)
+    return why
 
 
-def _is_harmless(here: Execution, text: str) -> bool:
-    """Tell whether unknown text does nothing to the arm and calls no function."""
+def _forget_by_text(here: Execution, text: str, why: str) -> bool:
+    """Forget what only text that moves could change; tell whether it may move."""
     called = (here.world.is_function(here.place, name) for name in words_in(text))
-    return is_harmless(text) and not any(called)
-
-
-def _forget_by_text(here: Execution, why: str) -> None:
-    """Forget what only a statement that may move the arm could change."""
+    if is_harmless(text) and not any(called):
+        return False
     here.store.forget_surroundings(why)
     text = (
         "this statement is not understood: the position of the arm, its frames and "
@@ -269,6 +268,7 @@ def _forget_by_text(here: Execution, why: str) -> None:
         "until these are set again"
     )
     here.world.report(here.place.program, here.row, Code.MOTION_UNKNOWN, text)
+    return True
 
 
 def run_broken(machine: Machine, here: Execution) -> None:
@@ -296,10 +296,12 @@ class Resolved:
     Attributes:
         visits: Its arrivals.
         diagnostics: What was found, sorted by file and line.
+        missed: Lines of moves that no way leads to, by file.
     """
 
     visits: Visits
     diagnostics: tuple[Diagnostic, ...]
+    missed: Mapping[str, Ints]
 
 
 def resolve(
@@ -336,9 +338,12 @@ def resolve(
     _keep_exported(world, machine)
     world.pin_loose()
     world.settle()
-    visits = Collector(machine).collect()
+    collector = Pdl2Collector(machine)
+    visits = collector.collect()
+    moves = (np.flatnonzero(one.lines.which(has_target)) for one in world.programs())
+    missed = collector.find_unreached(moves)
     machine.root.forget()
-    return Resolved(visits, tuple(sorted(world.diagnostics)))
+    return Resolved(visits, tuple(sorted(world.diagnostics)), missed)
 
 
 def _keep_exported(world: World, machine: Machine) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import root_of, wholes
-from postproc.language.pdl2.entries import Entries
+from postproc.language.pdl2.entries import NO_ENTRIES, Entries
 from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.pdl2.program import (
     Body,
@@ -32,92 +31,41 @@ from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
 
-@dataclass(frozen=True)
-class FilePoints:
-    """Points whose six numbers a variable file tells.
+@dataclass
+class InitialValues:
+    """Values by key; points of a variable file are made when they are asked for.
 
     Attributes:
+        other: Values that are no points of the variable file.
+        asked: Keys of others that the program takes as they are when it starts.
+        unset: Keys that no file gives a value, and what else they may begin with.
         prefix: What keys of the program's own variables begin with, before their names.
-        own: Which rows of `entries` are points of such variables.
-        entries: The entries of the file.
+        entries: The entries of the variable file.
         base: Global index of the file's first number.
+        own: Which rows of `entries` are points of such variables.
         shared: Another program may read it too, by row of `entries`.
         taught: Marked as taught where it is declared, likewise.
-        asked: The program takes it as it is in the file, likewise.
+        used: The program takes it as it is in the file, likewise.
     """
 
-    prefix: str
-    own: Bools
-    entries: Entries
-    base: int
-    shared: Bools
-    taught: Bools
-    asked: Bools
+    other: dict[str, Value] = field(default_factory=dict)
+    asked: set[str] = field(default_factory=set)
+    unset: dict[str, Value] = field(default_factory=dict)
+    prefix: str = "\0"  # of no key
+    entries: Entries = NO_ENTRIES
+    base: int = 0
+    own: Bools = field(default_factory=lambda: np.empty(0, bool))
+    shared: Bools = field(default_factory=lambda: np.empty(0, bool))
+    taught: Bools = field(default_factory=lambda: np.empty(0, bool))
+    used: Bools = field(default_factory=lambda: np.empty(0, bool))
 
-    def row(self, key: str) -> int:
-        """Return the row of a key, -1 where it is no point."""
+    def point(self, key: str) -> int:
+        """Return the row of a point that the variable file tells, -1 for all else."""
         if key.startswith(self.prefix):
             row = self.entries.row.get(key[len(self.prefix) :], -1)
             if row >= 0 and self.own[row]:
                 return row
         return -1
-
-    def rows(self, names: NameColumn) -> Ints:
-        """Return the rows of the program's own variables, (m,), -1 for no points.
-
-        Args:
-            names: Their names, in lower case.
-        """
-        rows = self.entries.row.find(names)
-        rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
-        return rows
-
-    def keys(self) -> Iterator[str]:
-        """Go through the keys, in the order of the file."""
-        for name, row in self.entries.row.items():
-            if self.own[row]:
-                yield self.prefix + name
-
-    def parts(self) -> Iterator[str]:
-        """Go through the keys that may be elements or fields."""
-        if self.entries.parts or any(c in self.prefix for c in "[."):
-            yield from self.keys()
-
-    def position(self, row: int) -> Position:
-        """Return the value of a point."""
-        entries, layout = self.entries, self.entries.layout_of(row)
-        slots = entries.slots[row].tolist()
-        return Position(
-            layout.kind == "JNTP",
-            entries.numbers_of(row),
-            tuple(self.base + slot if slot >= 0 else -1 for slot in slots),
-            layout.config,
-            entries.aux_of(row),
-            entries.name[row],
-            taught=bool(self.taught[row]),
-            shared=bool(self.shared[row]),
-        )
-
-
-@dataclass
-class InitialValues:
-    """Values by key; those of points are made when they are asked for.
-
-    Attributes:
-        other: Values that are no points of the variable file.
-        points: Points of the variable file.
-        asked: Keys of others that the program takes as they are when it starts.
-        unset: Keys that no file gives a value, and what else they may begin with.
-    """
-
-    other: dict[str, Value] = field(default_factory=dict)
-    points: FilePoints | None = None
-    asked: set[str] = field(default_factory=set)
-    unset: dict[str, Value] = field(default_factory=dict)
-
-    def point(self, key: str) -> int:
-        """Return the row of a point that the variable file tells, -1 for all else."""
-        return -1 if self.points is None else self.points.row(key)
 
     def rows(self, prefix: str, names: NameColumn) -> Ints:
         """Return the rows of points of a program's own variables, (m,), -1 for others.
@@ -126,25 +74,36 @@ class InitialValues:
             prefix: What the keys of its variables begin with.
             names: Names of its variables, in lower case.
         """
-        if self.points is None or prefix != self.points.prefix:
+        if prefix != self.prefix:
             return np.full(len(names), -1)
-        return self.points.rows(names)
+        rows = self.entries.row.find(names)
+        rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
+        return rows
+
+    def position(self, row: int) -> Position:
+        """Return the value of a point of the variable file."""
+        entries, layout = self.entries, self.entries.layout_of(row)
+        slots = entries.slots[row].tolist()
+        return Position(
+            layout.kind == "JNTP", entries.numbers_of(row),
+            tuple(self.base + slot if slot >= 0 else -1 for slot in slots),
+            layout.config, entries.aux_of(row), entries.name[row],
+            taught=bool(self.taught[row]), shared=bool(self.shared[row]),
+        )  # fmt: skip
 
     def find(self, key: str) -> Value | None:
         """Return what a key holds, None where it holds nothing."""
         row = self.point(key)
-        if row >= 0 and self.points is not None:
-            self.points.asked[row] = True
-            return self.points.position(row)
+        if row >= 0:
+            self.used[row] = True
+            return self.position(row)
         self.asked.add(key)
         return self.other.get(key, self.unset.get(key))
 
     def is_asked(self, key: str) -> bool:
         """Tell whether the program takes what a key holds when it starts."""
         row = self.point(key)
-        if row >= 0 and self.points is not None:
-            return bool(self.points.asked[row])
-        return key in self.asked
+        return bool(self.used[row]) if row >= 0 else key in self.asked
 
     def change(self, key: str, value: Value) -> None:
         """Let a key hold a value, whatever the variable file says."""
@@ -152,8 +111,8 @@ class InitialValues:
             self.unset[key] = value
             return
         row = self.point(key)
-        if row >= 0 and self.points is not None:
-            self.points.own[row] = False
+        if row >= 0:
+            self.own[row] = False
             self.asked.add(key)
         self.other[key] = value
 
@@ -167,8 +126,10 @@ class InitialValues:
 
     def parts(self) -> Iterator[str]:
         """Go through the keys, but for most of those that are no parts of others."""
-        own = self.points.parts() if self.points is not None else ()
-        return chain(own, (key for key in self.other if self.point(key) < 0))
+        if self.entries.parts or any(c in self.prefix for c in "[."):
+            rows = self.entries.row.items()
+            yield from (self.prefix + name for name, row in rows if self.own[row])
+        yield from (key for key in self.other if self.point(key) < 0)
 
 
 @dataclass(frozen=True)
@@ -223,7 +184,6 @@ class World:
     variables: ValueFile | None
     slot_base: dict[str, int] = field(default_factory=dict)
     row_base: dict[str, int] = field(default_factory=dict)
-    files: list[str] = field(default_factory=list)
     initial: InitialValues = field(default_factory=InitialValues)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     loose: dict[str, str] = field(default_factory=dict)
@@ -244,14 +204,12 @@ class World:
             self.slot_base[program.lines.source.name] = base
             self.row_base[program.lines.source.name] = row
             row += len(program.lines) + 1
-            self.files.append(program.lines.source.name)
             base += len(program.lines.numbers)
             source = program.lines.source
             self.taught_lines[source.name] = COMMENTS.list_taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)
         if self.variables is not None:
             self.slot_base[self.variables.source.name] = base
-            self.files.append(self.variables.source.name)
 
     @property
     def arm(self) -> int:

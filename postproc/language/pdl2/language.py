@@ -18,7 +18,6 @@ from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.nested import name_parts
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
-from postproc.language.pdl2.side_effects import dead_lines
 from postproc.language.pdl2.variable_file import (
     VariableFile,
     read_variables,
@@ -77,13 +76,11 @@ class Pdl2(Language):
         others = _by_name(program, pages)
         release_memory(sum(len(text.numbers) for text in texts))
         resolved = resolve(program, start, variables, others)
-        visits, parsed = resolved.visits, (program, *pages)
-        missed = dead_lines(parsed, visits)
+        visits, missed = resolved.visits, resolved.missed
         told = never_reached(missed, "the start", "program")
         found = (*resolved.diagnostics, *told)
-        files: tuple[Parsed, ...] = parsed
-        if variables is not None:
-            files = (*parsed, variables)
+        files: list[Parsed] = [program, *pages]
+        files += [] if variables is None else [variables]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(
             _without_values(one) if one.lines.source.name in corrected else one

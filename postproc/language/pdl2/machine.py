@@ -15,7 +15,7 @@ from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.interpreter import Interpreter, calls_around
 from postproc.language.analysis.origins import MANY, NOWHERE, TOLD_TOGETHER, Origins
 from postproc.language.pdl2.abstract_state import GivenValues, Settings, Store
-from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
+from postproc.language.pdl2.evaluate import Execution, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
 from postproc.language.pdl2.side_effects import circles, list_invoked
@@ -84,7 +84,7 @@ class MoveRun:
         rows: Their rows, (k,).
         form: Which form each has, (k,).
         forms: The forms, by number.
-        predecessors: Visits the first of them may come from.
+        origins: Visits the first of them may come from.
         settings: Frames and motion variables that hold, but for overrides.
         point: Row of the variable file that each goes to, (k,); WRITTEN where the
             numbers stand in the move, HELD where its goal was evaluated.
@@ -96,14 +96,15 @@ class MoveRun:
     rows: Ints
     form: Ints
     forms: Mapping[int, MoveForm]
-    predecessors: Origins
+    origins: Origins
     settings: Settings
     point: Ints
     goals: Mapping[int, Goal]
     reason: Reason = NO_REASON
 
-    def __len__(self) -> int:
-        """Return the number of visits."""
+    @property
+    def count(self) -> int:
+        """The number of visits."""
         return len(self.rows)
 
 
@@ -119,28 +120,18 @@ def _only(form: MoveForm) -> dict[int, MoveForm]:
 def single(
     here: Execution,
     form: MoveForm,
-    predecessors: Origins,
+    origins: Origins,
     settings: Settings,
     goal: Goal,
 ) -> MoveRun:
     """Return the run of one move, whose goal was evaluated."""
     row, forms = np.array([here.row]), _only(form)
-    return MoveRun(
-        here.place, row, _FIRST, forms, predecessors, settings, _HELD, {0: goal}
-    )
+    return MoveRun(here.place, row, _FIRST, forms, origins, settings, _HELD, {0: goal})
 
 
 DEEP = 64  # calls within calls, from where on it pays to know which call themselves
 
 Key = tuple[Context, int, int]
-
-
-@dataclass
-class Execution(ProgramPoint):
-    """A point of the execution with the way that led to it."""
-
-    context: Context = field(default_factory=Context)
-    reason: Reason = NO_REASON  # why nothing here may be compensated
 
 
 @dataclass(kw_only=True)
@@ -149,8 +140,6 @@ class Machine(Interpreter[Store]):
 
     Attributes:
         world: The files of the job.
-        arrivals: Runs of visits, by place; the last analysis of a place holds.
-        ids: First visit id of each.
         recursive: Bodies (by id) that call themselves, directly or not.
         interrupted: A condition handler may move the arm at any time.
         handler: Why no move can be compensated that a handler may interrupt.
@@ -159,8 +148,6 @@ class Machine(Interpreter[Store]):
     """
 
     world: World
-    arrivals: dict[Key, MoveRun] = field(default_factory=dict)
-    ids: dict[Key, int] = field(default_factory=dict)
     volatile: frozenset[str] = frozenset()
     recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
@@ -168,18 +155,19 @@ class Machine(Interpreter[Store]):
     cycle_left: bool = False
     given: GivenValues = field(default_factory=GivenValues)
     _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
-    next_id: int = 0
+    _numbers: dict[Key, int] = field(default_factory=dict)
 
-    def record(self, here: Execution, sub: int, arrival: MoveRun) -> int:
-        """Keep visits; return the id of the first."""
+    def record(self, here: Execution, sub: int, run: MoveRun) -> int:
+        """Keep visits, and return their number; the last analysis of a place holds."""
         key = (here.context, here.place.offset + here.row, sub)
-        self.arrivals[key] = arrival
-        if MANY in arrival.predecessors:
+        number = self._numbers.setdefault(key, len(self.visits))
+        if number == len(self.visits):
+            self.keys.append(key)
+            self.visits.append(run)
+        self.visits[number] = run
+        if MANY in run.origins:
             here.report_once(Code.MANY_ORIGINS, str(here.row), TOLD_TOGETHER)
-        if key not in self.ids:
-            self.ids[key] = self.next_id
-            self.next_id += len(arrival)
-        return self.ids[key]
+        return number
 
     def predecessors(self, here: Execution) -> Origins:
         """Return where the arm may come from."""

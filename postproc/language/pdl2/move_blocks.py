@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
@@ -12,12 +11,12 @@ from postproc.arrays import Bools, Ints
 from postproc.language import ir
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
+from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.external_routines import stays_still
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
     HELD,
     WRITTEN,
-    Execution,
     Goal,
     Machine,
     MoveForm,
@@ -55,7 +54,6 @@ class PointVariable:
     index: tuple[int, ...]
 
 
-@dataclass(frozen=True)
 class PlainMoves:
     """The quiet lines of a body.
 
@@ -74,17 +72,42 @@ class PlainMoves:
         ends: Rows at which stretches end, ascending.
     """
 
-    first: int
-    variant: Ints
-    statements: tuple[ir.SourceStatement, ...]
-    forms: tuple[MoveForm | None, ...]
-    calls: tuple[bool, ...]
-    points: Mapping[int, PointVariable]
-    prefix: str
-    names: NameColumn
-    rows: Ints
-    name: Ints
-    ends: Ints
+    def __init__(
+        self, world: World, place: Place, volatile: frozenset[str], may_be: Bools
+    ) -> None:
+        """Find them.
+
+        Args:
+            world: The files of the job.
+            place: The body.
+            volatile: Names that condition handlers change.
+            may_be: Which shapes of the program may be those of quiet lines, (k,).
+        """
+        self._world, self._place, self._volatile = world, place, volatile
+        program, body = place.program, place.body
+        self._parameters = {p.name for p in body.parameters}
+        self.statements: list[ir.SourceStatement] = []
+        self.points: dict[int, PointVariable] = {}
+        self.prefix, self.names = f"{program.name}/", NameColumn()
+        self.first = first = body.first + 1
+        shape = program.lines.shape[first : body.last]
+        self._shapes, own = np.unique(shape, return_inverse=True)
+        self._name = np.full(len(self._shapes), -1, dtype=np.int64)
+        of_shape, shapes = self._name.copy(), self._shapes[may_be[self._shapes]]
+        forms = program.lines.said.form[shapes]
+        kinds, begins = np.unique(np.sort(forms), return_index=True)
+        groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
+        for form, mine in zip(kinds.tolist(), groups, strict=False):
+            of_shape[np.searchsorted(self._shapes, mine)] = self._add(form, mine)
+        self.variant: Ints = of_shape[own]
+        joins = np.array(sorted(body.flow.joins), dtype=np.int64)
+        loud = first + np.flatnonzero(self.variant < 0)
+        self.ends: Ints = np.unique(np.concatenate([loud, joins, [body.last]]))
+        said = self.statements
+        self.forms = [_form(one) if isinstance(one, ast.Move) else None for one in said]
+        self.calls = [any(_calls(world, place, one)) for one in said]
+        self.rows = world.initial.rows(self.prefix, self.names)
+        self.name: Ints = self._name[own]
 
     def end(self, row: int) -> int:
         """Return the row after the stretch of a move, the row itself if none."""
@@ -93,46 +116,103 @@ class PlainMoves:
             return row
         return int(self.ends[np.searchsorted(self.ends, row, side="right")])
 
+    def _add(self, form: int, shapes: Ints) -> Ints:
+        """Return the variants of shapes of one form, -1 where one is not quiet."""
+        said = self._place.program.lines.said
+        one = said.said[form]
+        where = one.where[0] if isinstance(one, ast.Move) else None
+        names = said.shapes.names_at(shapes)
+        if not isinstance(where, ir.DataObject):
+            return self._variants(shapes, names)
+        index, at = _number_slots(where.steps), name_index(where.name)
+        variants = np.full(len(shapes), -1)
+        if index is None:
+            return variants
+        goal, which = NameColumn([where.name]), np.zeros(len(shapes), dtype=np.int64)
+        if at >= 0:
+            used, which = np.unique(names[:, at], return_inverse=True)
+            goal = said.shapes.names.take(used.astype(np.int64)).lower()
+            names = np.delete(names, at, axis=1)
+        quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
+        variants[quiet] = self._variants(shapes[quiet], names[quiet])
+        return variants
 
-def find_plain_moves(
-    world: World, place: Place, volatile: frozenset[str], may_be: Bools
-) -> PlainMoves:
-    """Find the quiet lines of a body.
+    def _points(
+        self,
+        shapes: Ints,
+        goal: NameColumn,
+        which: Ints,
+        index: tuple[int, ...],
+        array: bool,
+    ) -> Bools:
+        """Enter where shapes go, and tell which of them go to a point, (m,).
 
-    Args:
-        world: The files of the job.
-        place: The body.
-        volatile: Names that condition handlers change.
-        may_be: Which shapes of the program may be those of quiet lines, (k,).
-    """
-    program, body = place.program, place.body
-    first = body.first + 1
-    used, own = np.unique(program.lines.shape[first : body.last], return_inverse=True)
-    variants = _Variants(world, place, volatile, used)
-    of_shape = np.full(len(used), -1, dtype=np.int64)
-    shapes = used[may_be[used]]
-    forms = program.lines.said.form[shapes]
-    kinds, begins = np.unique(np.sort(forms), return_index=True)
-    groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
-    for form, mine in zip(kinds.tolist(), groups, strict=False):
-        of_shape[np.searchsorted(used, mine)] = variants.add(form, mine)
-    variant = of_shape[own]
-    joins = np.array(sorted(body.flow.joins), dtype=np.int64)
-    ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
-    said = variants.statements
-    return PlainMoves(
-        first,
-        variant,
-        tuple(said),
-        tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
-        tuple(any(_calls(world, place, one)) for one in said),
-        variants.points,
-        variants.prefix,
-        variants.names,
-        world.initial.rows(variants.prefix, variants.names),
-        variants.name[own],
-        np.unique(ends),
-    )
+        Args:
+            shapes: Shapes of one form, (m,).
+            goal: Names that they go to.
+            which: The one of each, (m,).
+            index: Number slots of an element's index.
+            array: Whether there is any.
+        """
+        place = self._place
+        declared = place.program.variables
+        points = declared.passing(goal, lambda said: _is_point(said.type, array))
+        alone = ~declared.passing(goal, lambda said: bool(said.exported))
+        alone &= not array and not any(mark in self.prefix for mark in "[.")
+        hidden = NameColumn(sorted(place.body.own_names | self._volatile)).find(goal)
+        for k in np.flatnonzero(hidden >= 0).tolist():
+            points[k], alone[k] = self._is_point(goal[k], array), False
+        own = np.flatnonzero((points & alone)[which])
+        at = np.searchsorted(self._shapes, shapes[own])
+        self._name[at] = len(self.names) + which[own]
+        self.names.extend(goal)
+        for k in np.flatnonzero((points & ~alone)[which]).tolist():
+            key = self._world.root(place, goal[which[k]])
+            self.points[int(shapes[k])] = PointVariable(key, index)
+        found: Bools = points[which]
+        return found
+
+    def _variants(self, shapes: Ints, names: Ints) -> Ints:
+        """Return the variants of shapes of one form with some names, (m,)."""
+        ends = names.shape[1] * np.arange(1, len(shapes) + 1)
+        kind = alike(names.ravel(), ends - names.shape[1], ends)
+        found = []
+        for k in number_in_order(kind)[1].tolist():
+            one = self._place.program.lines.said[int(shapes[k])]
+            quiet = all(map(self._does_nothing, _calls(self._world, self._place, one)))
+            found.append(len(self.statements) if quiet else -1)
+            self.statements += [one] if quiet else []
+        return np.array(found, dtype=np.int64)[kind]
+
+    def _is_point(self, name: str, array: bool) -> bool:
+        """Tell whether a name is a variable whose value no call changes unseen."""
+        if name in self._parameters or name in self._volatile:
+            return False
+        return _is_point(self._world.type_of(self._place, name), array)
+
+    def _does_nothing(self, call: ir.FunctionCall) -> bool:
+        """Tell whether a call neither moves the arm nor sets what moves depend on."""
+        name = call.name
+        if self._world.find_routine(self._place.program, name) is not None:
+            return False
+        bare = name not in CHANGING and name not in PURE
+        if bare and not stays_still(self._world, self._place.program, name):
+            return False
+        return all(self._keeps(a, bare) for a in call.values)
+
+    def _keeps(self, argument: ir.Operand | None, bare: bool) -> bool:
+        """Tell whether nothing that moves depend on is known by an argument's name."""
+        match argument:
+            case None | ir.Num() | ir.StringLiteral() | ir.Operation(_, (ir.Num(),)):
+                return True
+            case ir.DataObject(name, ()):
+                type_ = self._world.type_of(self._place, name)
+                safe = type_ is None or (
+                    type_.name not in _POINTS and not type_.array and not type_.path
+                )
+                known = name.startswith("$") or name in self._parameters
+                return bare and safe and not known
+        return False
 
 
 def _may_be_plain(said: ir.SourceStatement) -> bool:
@@ -194,122 +274,6 @@ def _form(move: ast.Move) -> MoveForm:
 def _six_numbers(items: object) -> bool:
     assert isinstance(items, tuple | list)
     return len(items) == 6 and all(isinstance(i, ir.Num) for i in items)
-
-
-@dataclass
-class _Variants:
-    """The variants of quiet lines of a body, as they are found."""
-
-    world: World
-    place: Place
-    volatile: frozenset[str]
-    shapes: Ints  # of the body, ascending
-
-    def __post_init__(self) -> None:
-        self.statements: list[ir.SourceStatement] = []
-        self.points: dict[int, PointVariable] = {}
-        self._parameters = {p.name for p in self.place.body.parameters}
-        self.prefix = f"{self.place.program.name}/"
-        self.names = NameColumn()
-        self.name = np.full(len(self.shapes), -1, dtype=np.int64)
-
-    def add(self, form: int, shapes: Ints) -> Ints:
-        """Return the variants of shapes of one form, -1 where one is not quiet."""
-        said = self.place.program.lines.said
-        one = said.said[form]
-        where = one.where[0] if isinstance(one, ast.Move) else None
-        names = said.shapes.names_at(shapes)
-        if not isinstance(where, ir.DataObject):
-            return self._variants(shapes, names)
-        index, at = _number_slots(where.steps), name_index(where.name)
-        variants = np.full(len(shapes), -1)
-        if index is None:
-            return variants
-        goal, which = NameColumn([where.name]), np.zeros(len(shapes), dtype=np.int64)
-        if at >= 0:
-            used, which = np.unique(names[:, at], return_inverse=True)
-            goal = said.shapes.names.take(used.astype(np.int64)).lower()
-            names = np.delete(names, at, axis=1)
-        quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
-        variants[quiet] = self._variants(shapes[quiet], names[quiet])
-        return variants
-
-    def _points(
-        self,
-        shapes: Ints,
-        goal: NameColumn,
-        which: Ints,
-        index: tuple[int, ...],
-        array: bool,
-    ) -> Bools:
-        """Enter where shapes go, and tell which of them go to a point, (m,).
-
-        Args:
-            shapes: Shapes of one form, (m,).
-            goal: Names that they go to.
-            which: The one of each, (m,).
-            index: Number slots of an element's index.
-            array: Whether there is any.
-        """
-        place = self.place
-        declared = place.program.variables
-        points = declared.passing(goal, lambda said: _is_point(said.type, array))
-        alone = ~declared.passing(goal, lambda said: bool(said.exported))
-        alone &= not array and not any(mark in self.prefix for mark in "[.")
-        hidden = NameColumn(sorted(place.body.own_names | self.volatile)).find(goal)
-        for k in np.flatnonzero(hidden >= 0).tolist():
-            points[k], alone[k] = self._is_point(goal[k], array), False
-        own = np.flatnonzero((points & alone)[which])
-        at = np.searchsorted(self.shapes, shapes[own])
-        self.name[at] = len(self.names) + which[own]
-        self.names.extend(goal)
-        for k in np.flatnonzero((points & ~alone)[which]).tolist():
-            key = self.world.root(place, goal[which[k]])
-            self.points[int(shapes[k])] = PointVariable(key, index)
-        found: Bools = points[which]
-        return found
-
-    def _variants(self, shapes: Ints, names: Ints) -> Ints:
-        """Return the variants of shapes of one form with some names, (m,)."""
-        ends = names.shape[1] * np.arange(1, len(shapes) + 1)
-        kind = alike(names.ravel(), ends - names.shape[1], ends)
-        found = []
-        for k in number_in_order(kind)[1].tolist():
-            one = self.place.program.lines.said[int(shapes[k])]
-            quiet = all(map(self._does_nothing, _calls(self.world, self.place, one)))
-            found.append(len(self.statements) if quiet else -1)
-            self.statements += [one] if quiet else []
-        return np.array(found, dtype=np.int64)[kind]
-
-    def _is_point(self, name: str, array: bool) -> bool:
-        """Tell whether a name is a variable whose value no call changes unseen."""
-        if name in self._parameters or name in self.volatile:
-            return False
-        return _is_point(self.world.type_of(self.place, name), array)
-
-    def _does_nothing(self, call: ir.FunctionCall) -> bool:
-        """Tell whether a call neither moves the arm nor sets what moves depend on."""
-        name = call.name
-        if self.world.find_routine(self.place.program, name) is not None:
-            return False
-        bare = name not in CHANGING and name not in PURE
-        if bare and not stays_still(self.world, self.place.program, name):
-            return False
-        return all(self._keeps(a, bare) for a in call.values)
-
-    def _keeps(self, argument: ir.Operand | None, bare: bool) -> bool:
-        """Tell whether nothing that moves depend on is known by an argument's name."""
-        match argument:
-            case None | ir.Num() | ir.StringLiteral() | ir.Operation(_, (ir.Num(),)):
-                return True
-            case ir.DataObject(name, ()):
-                type_ = self.world.type_of(self.place, name)
-                safe = type_ is None or (
-                    type_.name not in _POINTS and not type_.array and not type_.path
-                )
-                known = name.startswith("$") or name in self._parameters
-                return bare and safe and not known
-        return False
 
 
 def _is_point(type_: ast.Type | None, array: bool) -> bool:
@@ -397,7 +361,7 @@ class MoveBlocks:
         if id(program) not in self._may_be:
             self._may_be[id(program)] = program.lines.said.which(_may_be_plain)
         if id(body) not in self.quiet:
-            self.quiet[id(body)] = find_plain_moves(
+            self.quiet[id(body)] = PlainMoves(
                 here.world, here.place, here.volatile, self._may_be[id(program)]
             )
         return self.quiet[id(body)]
@@ -433,9 +397,8 @@ class MoveBlocks:
         """
         here.row = int(run.rows[0])
         come = self.machine.predecessors(here)
-        run = replace(run, predecessors=come, reason=here.reason)
-        base = self.machine.record(here, 0, run)
-        here.store.last = frozenset({base + len(run) - 1})
+        run = replace(run, origins=come, reason=here.reason)
+        here.store.last = frozenset({self.machine.record(here, 0, run)})
 
 
 def _points(
@@ -465,8 +428,7 @@ def _points(
             if isinstance(value, Nothing):
                 here.world.pin(value, UNSURE)
             point[at], goals[at] = HELD, from_value(value)
-    if initial.points is not None:
-        initial.points.asked[point[point >= 0]] = True
+    initial.used[point[point >= 0]] = True
     return point, goals
 
 

@@ -9,16 +9,9 @@ from postproc.language import ir
 from postproc.language.analysis.origins import NOWHERE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
-from postproc.language.pdl2.evaluate import SINGLE, parts_under
-from postproc.language.pdl2.machine import (
-    Execution,
-    Goal,
-    Machine,
-    MoveForm,
-    escape_names,
-    single,
-)
-from postproc.language.pdl2.side_effects import goes_to_target, references
+from postproc.language.pdl2.evaluate import SINGLE, Execution, parts_under
+from postproc.language.pdl2.machine import Goal, Machine, MoveForm, escape_names, single
+from postproc.language.pdl2.side_effects import goes_to_target
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, add_unknown
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -307,7 +300,7 @@ def _keep(here: Execution, statement: ast.Move) -> None:
             f"corrected. Compensate it with a cell of its arm{number}, and its model"
         )
         here.world.report(here.place.program, here.row, Code.OTHER_ARM, text)
-    names = frozenset(r.name for r in references(*statement.where, statement.via))
+    names = frozenset(r.name for r in ir.data_in(*statement.where, statement.via))
     escape_names(here, names, "another arm goes to it too")
 
 

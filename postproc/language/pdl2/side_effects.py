@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from postproc.arrays import Ints
 from postproc.language import ir
 from postproc.language.analysis.call_graph import lead_to_recursion, reach
 from postproc.language.pdl2 import syntax as ast
@@ -22,7 +21,6 @@ from postproc.language.pdl2.external_routines import (
 )
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Program
-from postproc.language.visits import Visits
 
 PURE = frozenset(
     "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
@@ -111,20 +109,10 @@ class Effects:
     cancels: frozenset[ir.SourceStatement] = frozenset()
 
 
-def invocations(*nodes: ir.Node | None) -> Iterator[ir.FunctionCall]:
-    """Yield the function calls in statements or values, inner ones first."""
-    return (part for part in ir.walk(*nodes) if isinstance(part, ir.FunctionCall))
-
-
-def references(*nodes: ir.Node | None) -> Iterator[ir.DataObject]:
-    """Yield the variables in statements or values."""
-    return (part for part in ir.walk(*nodes) if isinstance(part, ir.DataObject))
-
-
 def list_invoked(world: World, place: Place, *nodes: ir.Node) -> list[ir.FunctionCall]:
     """List the calls in nodes that may have effects, those by a name alone, too."""
-    found = [call for call in invocations(*nodes) if call.name not in PURE]
-    names = {r.name for r in references(*nodes) if not r.steps}
+    found = [call for call in ir.calls_in(*nodes) if call.name not in PURE]
+    names = {r.name for r in ir.data_in(*nodes) if not r.steps}
     alone = sorted(name for name in names if world.is_function(place, name))
     return found + [ir.FunctionCall(name, ()) for name in alone]
 
@@ -154,7 +142,7 @@ def names_but_ends(program: Program, first: int, last: int) -> frozenset[str]:
     for one in _list_statements(program, first, last):
         move = ast.action(one)
         ends = [*move.where, move.via] if isinstance(move, ast.Move) else []
-        found |= {r.name for r in references(one) if all(r is not e for e in ends)}
+        found |= {r.name for r in ir.data_in(one) if all(r is not e for e in ends)}
     return frozenset(found)
 
 
@@ -166,44 +154,38 @@ def _list_statements(
     return (program.lines.said[shape] for shape in shapes.tolist())
 
 
+_END = ir.Leave("exitcycle")
+
+
 @lru_cache(maxsize=8192)
 def _direct(statement: ir.SourceStatement) -> Effects:
-    assigned: set[str] = set()
-    calls = {i.name for i in invocations(statement)}
-    moves = False
-    action = ast.action(statement)
-    ends = isinstance(action, ast.CancelMove) or action == ir.Leave("exitcycle")
-    cancels = frozenset([action] if action and ends else [])
-    if then := ast.behind(statement):
-        inner = _direct(then)
-        moves, assigned = inner.moves, set(inner.assigned)
-        calls |= inner.calls
-    match statement:
-        case ast.Move():
-            moves = True
-        case ir.NotUnderstood(text):
-            moves, assigned = True, set(words_in(text))
-            if not is_harmless(text):
-                assigned |= {f"${frame}" for frame in FRAMES}
-        case ir.Assignment(target):
-            assigned.add(_name_assigned(target))
-        case ir.ForLoop(name):
-            assigned.add(name)
-        case ast.Transfer(word, operands) if word != "WRITE":
-            assigned |= {_name_assigned(o) for o in list_changed_arguments(operands)}
-        case ir.Instruction(name):
-            calls.add(name)
-            changed = list_changed_arguments(statement.values)
-            assigned |= {_name_assigned(a) for a in changed}
-    for call in invocations(statement):
-        if call.name not in PURE:
-            changed = list_changed_arguments(call.values)
-            assigned |= {_name_assigned(a) for a in changed}
-    if TRACKING in calls:
+    chain, calls, assigned = [statement], ir.calls_in(statement), set[str]()
+    while (then := ast.behind(chain[-1])) is not None:
+        chain.append(then)
+    called = {call.name for call in calls}
+    changed = [a for call in calls if call.name not in PURE for a in call.values]
+    for one in chain:
+        match one:
+            case ir.NotUnderstood(text):
+                assigned |= words_in(text)
+                assigned |= set() if is_harmless(text) else {f"${f}" for f in FRAMES}
+            case ir.Assignment(target):
+                changed.append(target)
+            case ir.ForLoop(name):
+                assigned.add(name)
+            case ast.Transfer(word, operands) if word != "WRITE":
+                changed += operands
+            case ir.Instruction(name):
+                called.add(name)
+                changed += one.values
+    assigned.update(map(_name_assigned, list_changed_arguments(tuple(changed))))
+    if TRACKING in called:
         assigned.add(f"${TRACKING}")
-    read = frozenset(reference.name for reference in references(statement))
-    called = frozenset(calls - PURE - CHANGING)
-    return Effects(moves, frozenset(assigned), read, called, cancels)
+    moves = any(isinstance(one, ast.Move | ir.NotUnderstood) for one in chain)
+    read = frozenset(data.name for data in ir.data_in(statement))
+    ends = (one for one in chain[-1:] if isinstance(one, ast.CancelMove) or one == _END)
+    called -= PURE | CHANGING
+    return Effects(moves, frozenset(assigned), read, frozenset(called), frozenset(ends))
 
 
 def _name_assigned(reference: ir.DataObject) -> str:
@@ -327,28 +309,7 @@ def circles(world: World) -> frozenset[int]:
     return lead_to_recursion(calls)
 
 
-# Moves that a program never comes to: their targets keep their values.
-
-
-def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
-    """Return the lines of moves that no way leads to, by file, (k,) ascending.
-
-    Args:
-        programs: The files of a job.
-        visits: Every arrival in them.
-    """
-    found = {}
-    for program in programs:
-        name = program.lines.source.name
-        lines = program.lines.begin_line[program.lines.which(_has_target)]
-        own = visits.place.file == visits.files.index(name)
-        missed = lines[~np.isin(lines, visits.place.line[own])]
-        if len(missed):
-            found[name] = missed
-    return found
-
-
-def _has_target(statement: ir.SourceStatement) -> bool:
+def has_target(statement: ir.SourceStatement) -> bool:
     """Tell whether a line moves to a target, and not to a system variable.
 
     A move that names its arm may be one of another arm, and does not count.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
@@ -18,40 +19,26 @@ from postproc.arrays import (
     spans,
 )
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.call_context import Point
-from postproc.language.analysis.origins import NOWHERE, number_origins
+from postproc.language.analysis.origins import NOWHERE, Origins
+from postproc.language.analysis.to_visits import Collector, find_measured
 from postproc.language.analysis.visit_columns import (
     TOO_COMPLEX,
-    Numbering,
     VisitColumns,
-    chain_visits,
     find_literals,
     to_visits,
 )
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.conditions import SettingTable
 from postproc.language.pdl2.job import World, base_variable
-from postproc.language.pdl2.machine import (
-    WRITTEN,
-    Goal,
-    Machine,
-    MoveForm,
-    MoveRun,
-)
+from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
 from postproc.language.pdl2.pose_encoding import COMMENTS, PDL2_DIALECT
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.text.comment_directives import MEASURE
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import number_in_order
-from postproc.language.visits import (
-    Graph,
-    Literals,
-    Meaning,
-    Visits,
-    ZoneRule,
-    texts_of,
-)
+from postproc.language.visits import Literals, Meaning, Visits, ZoneRule, texts_of
 
 _COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 _IN_PART = "a target is computed from a part of it"
@@ -88,7 +75,7 @@ class ProgramMoves:
 
     def __post_init__(self) -> None:
         at, runs = zip(*self.runs, strict=True)
-        sizes = np.array([len(run) for run in runs])
+        sizes = np.array([run.count for run in runs])
         self.visit: Ints = spans(np.array(at), sizes)
         self.row: Ints = _together([run.rows for run in runs])
         self.run: Indices = np.repeat(np.arange(len(runs), dtype=np.int32), sizes)
@@ -111,7 +98,7 @@ class ProgramMoves:
         for _, run in self.runs:
             for k, goal in run.goals.items():
                 yield begin + k, run, goal
-            begin += len(run)
+            begin += run.count
 
 
 def _together(columns: Sequence[Ints]) -> Ints:
@@ -130,32 +117,25 @@ def _number_forms(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
     return table[run.form]
 
 
-class Collector:
-    """Fills the columns of the visits that a machine has found.
+class Pdl2Collector(Collector):
+    """Fills the columns of the visits that a machine has found, runs of moves.
 
     Attributes:
-        machine: Has followed the program.
-        ordered: Runs of moves and their keys, in program order.
-        offsets: The first visit of every run, and how many there are, (r + 1,).
         columns: The visits.
         bases: The six numbers that computed targets are made of, by visit.
     """
 
+    machine: Machine
+    found: list[MoveRun]
+
     def __init__(self, machine: Machine) -> None:
         """Put runs in order, and make room."""
-        self.machine, world = machine, machine.world
-        self.ordered = sorted(
-            machine.arrivals.items(),
-            key=lambda item: (Point(item[0][0], item[0][1]), item[0][2]),
-        )
-        self.runs = [run for _, run in self.ordered]
-        sizes = [len(run) for run in self.runs]
-        self.offsets = np.cumsum([0, *sizes], dtype=np.int64)
-        texts = [(one.lines.source, one.lines.numbers) for one in world.programs()]
-        if (values := world.variables) is not None:
-            texts.append((values.source, values.lines.numbers))
-        self.numbering = Numbering.of(texts)
-        width, n, axes = PDL2_DIALECT.width, sum(sizes), _most_axes(self.runs, world)
+        world = machine.world
+        texts: list[Statements[Any]] = [one.lines for one in world.programs()]
+        texts += [] if world.variables is None else [world.variables.lines]
+        super().__init__(machine, texts)
+        width, n = PDL2_DIALECT.width, int(self.counts.sum())
+        axes = _most_axes(self.found, world)
         self.columns = VisitColumns(n, width, axes, len(self.numbering))
         self.bases: dict[int, tuple[int, ...]] = {}
         self.settings = SettingTable(self.columns.conditions)
@@ -163,18 +143,14 @@ class Collector:
 
     def collect(self) -> Visits:
         """Put the visits in program order and make arrays of them."""
-        c, machine = self.columns, self.machine
+        c = self.columns
         self._fill()
+        self._mark_pauses()
         release_memory(len(c))
         literals, literal = find_literals(c, self.numbering)
         literals, follows = self._find_uses(literals, literal)
-        ids = np.array([machine.ids[key] for key, _ in self.ordered], dtype=np.int64)
-        numbers = np.full(machine.next_id, -1, dtype=np.int32)  # the visit of every id
-        own = np.arange(self.offsets[-1], dtype=np.int32)
-        numbers[spans(ids, np.diff(self.offsets))] = own
-        files, graph = machine.world.files, self._graph(numbers)
-        visits = to_visits(c, files, graph, literals, literal, follows, PDL2_DIALECT)
-        return self._mark_pauses(visits, numbers)
+        own = self.files, self.graph(), literals, literal, follows
+        return to_visits(c, *own, PDL2_DIALECT)
 
     def _find_uses(
         self, literals: Literals, literal: Indices
@@ -205,37 +181,30 @@ class Collector:
             literals = replace(literals, pinned=texts_of(len(literals), stay))
         return literals, follows
 
-    def _mark_pauses(self, visits: Visits, visit: Indices) -> Visits:
+    def _mark_pauses(self) -> None:
         """Say of which fly points it is not known whether the arm stops there."""
-        ids = self.machine.paused, self.machine.lost
-        paused, lost = (
-            np.array([visit[k] for k in some if k >= 0], dtype=np.int64) for some in ids
-        )
-        goes_on = np.isin(paused, visits.graph.pred)
-        unsure = {*lost.tolist(), *paused[goes_on].tolist()}
-        rows = np.array(sorted(k for k in unsure if k >= 0), dtype=np.int64)
-        rule = visits.zone.rule[rows]
-        exact = (rule == ZoneRule.PASS) | (visits.zone.size_mm[rows] < 0.0)
-        rows = rows[visits.motion.fly[rows] & ~exact]
-        if len(rows) == 0:
-            return visits
-        rules = np.array(visits.zone.rule)
-        rules[rows] = ZoneRule.UNKNOWN
-        return visits.with_columns(rule=rules)
+        c = self.columns
+        rows = self.last[[*self.machine.find_unsure_stops()]]
+        rows, conditions = rows[c.fly[rows]], [*c.conditions]
+        for number in np.unique(c.condition[rows]).tolist():
+            one, mine = conditions[number], rows[c.condition[rows] == number]
+            if not (one.zone.rule == ZoneRule.PASS or one.zone.size_mm < 0.0):
+                zone = replace(one.zone, rule=ZoneRule.UNKNOWN)
+                c.condition[mine] = c.conditions[replace(one, zone=zone)]
 
-    def _graph(self, visit: Indices) -> Graph:
-        """Translate predecessor ids to visits, in CSR form."""
-        origins = []
-        for run in self.runs:  # the visits that its first move may come from
-            again = id(run.place.body) in self.machine.recursive
-            found = run.predecessors | (NOWHERE if again else frozenset())
-            origins.append(number_origins(found, visit))
-        return chain_visits(np.diff(self.offsets), origins)
+    def rows_of(self, run: MoveRun) -> tuple[int, Ints]:
+        """Return the file of a run and its rows, see `Collector.rows_of`."""
+        return self.files.index(run.place.program.lines.source.name), run.rows
+
+    def origins_of(self, run: MoveRun) -> Origins:
+        """Return where the arm may come from, in recursion from anywhere."""
+        again = id(run.place.body) in self.machine.recursive
+        return run.origins | NOWHERE if again else run.origins
 
     def _fill(self) -> None:
         """Fill the visits of all runs."""
         of_program: dict[int, list[tuple[int, MoveRun]]] = {}
-        for at, run in zip(self.offsets.tolist(), self.runs, strict=False):
+        for at, run in zip(self.begin.tolist(), self.found, strict=True):
             of_program.setdefault(id(run.place.program), []).append((at, run))
         for mine in of_program.values():
             moves = ProgramMoves(mine[0][1].place.program, mine)
@@ -254,7 +223,7 @@ class Collector:
     def _place(self, moves: ProgramMoves) -> None:
         """Enter where moves stand, and what their forms say."""
         c, visit, lines = self.columns, moves.visit, moves.program.lines
-        c.file[visit] = self.machine.world.files.index(lines.source.name)
+        c.file[visit] = self.files.index(lines.source.name)
         c.line[visit] = lines.begin_line[moves.row]
         c.kind[visit] = moves.of_forms(lambda form: form.motion)
         c.fly[visit] = moves.of_forms(lambda form: form.fly)
@@ -324,10 +293,8 @@ class Collector:
 
     def _names(self, moves: ProgramMoves) -> None:
         """Enter the names of the points that moves go to."""
-        points, names = self.machine.world.initial.points, NameColumn()
         at = np.flatnonzero(moves.point >= 0)
-        if points is not None and len(at):
-            names = points.entries.name.take(moves.point[at])
+        names = self.machine.world.initial.entries.name.take(moves.point[at])
         told = {
             k: goal.position.name
             for k, _, goal in moves.list_evaluated()
@@ -342,9 +309,9 @@ class Collector:
 
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
-        points = self.machine.world.initial.points
+        points = self.machine.world.initial
         some = np.flatnonzero(moves.point >= 0)
-        if points is None or len(some) == 0:
+        if len(some) == 0:
             return
         c, entries = self.columns, points.entries
         rows, visit = moves.point[some], moves.visit[some]
@@ -467,13 +434,15 @@ class Collector:
 
     def _marks(self, moves: ProgramMoves) -> None:
         """Enter the ids of moves that are measured."""
-        rows, ids = _find_measured(moves.program)
-        if not ids:
+        lines = moves.program.lines
+        marks = [*COMMENTS.marks(lines.source, MEASURE)]
+        if not marks:
             return
-        ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
-        at = np.searchsorted(rows, moves.row[ends])
-        for visit, k in zip(moves.visit[ends].tolist(), at.tolist(), strict=True):
-            self.columns.measured[visit] = ids[k]
+        rows = np.flatnonzero(lines.which(lambda said: isinstance(said, ast.Move)))
+        ids = find_measured(marks, lines.begin_line[rows], rows)
+        own = np.isin(moves.row, [*ids]) & ~self.columns.via[moves.visit]
+        named = [ids[row] for row in moves.row[own].tolist()]
+        self.columns.measured |= zip(moves.visit[own].tolist(), named, strict=True)
 
 
 def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
@@ -486,21 +455,6 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
     for kind in kinds:
         code, example = number_in_order(code * (int(kind.max()) + 1) + kind)
     return code, example
-
-
-def _find_measured(program: Program) -> tuple[Ints, list[str]]:
-    """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
-    lines = program.lines
-    marks = [*COMMENTS.marks(lines.source, MEASURE)]
-    if not marks:
-        return np.empty(0, dtype=np.int64), []
-    rows = np.flatnonzero(lines.which(lambda said: isinstance(said, ast.Move)))
-    found: dict[int, str] = {}
-    for line, mark in marks:
-        at = int(np.searchsorted(lines.begin_line[rows], line))
-        if at < len(rows):
-            found.setdefault(int(rows[at]), mark)
-    return np.array([*found], dtype=np.int64), [*found.values()]
 
 
 def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]:
@@ -520,16 +474,13 @@ def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]
     return found
 
 
-MOST_AXES = 12  # auxiliary axes that are told
-
-
 def _most_axes(runs: list[MoveRun], world: World) -> int:
     """Return the last auxiliary axis that targets give a value of."""
     goals = (goal.position for run in runs for goal in run.goals.values())
     axes = {axis for p in goals if p is not None for axis, _ in p.aux or ()}
-    points = world.initial.points
-    if points is not None and runs:
+    entries = world.initial.entries
+    if entries.layouts and runs:
         rows = np.concatenate([run.point for run in runs])
-        used: list[int] = np.unique(points.entries.layout[rows[rows >= 0]]).tolist()
-        axes |= {axis for k in used for axis in points.entries.layouts[k].axes}
+        used: list[int] = np.unique(entries.layout[rows[rows >= 0]]).tolist()
+        axes |= {axis for k in used for axis in entries.layouts[k].axes}
     return max([0, *(min(axis, MOST_AXES) for axis in axes)])

@@ -12,7 +12,7 @@ from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.program import inside
-from postproc.language.rapid.symbols import SHIFTS, functions_in
+from postproc.language.rapid.symbols import SHIFTS
 from postproc.language.text.statement_table import StatementText
 
 Numbers = frozenset[str] | None
@@ -231,7 +231,7 @@ def may_raise(
         return False
     if numbers is None:
         return True
-    functions = [*functions_in(one)]
+    functions = [call.name for call in ir.calls_in(one)]
     if any(name in routines for name in functions):
         return bool(numbers)
     one = inside(one)
@@ -253,7 +253,7 @@ def may_be_skipped(one: ir.SourceStatement) -> bool:
     if not isinstance(one, ir.Instruction):
         return False
     concurrent = any(argument.name == "conc" for argument in one.arguments)
-    asks = any(name not in SHIFTS for name in functions_in(one))
+    asks = any(call.name not in SHIFTS for call in ir.calls_in(one))
     indexed = any(map(_is_indexed, one.values))
     return concurrent or asks or indexed or one.name in COUPLING
 

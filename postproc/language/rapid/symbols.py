@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Container, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
@@ -337,10 +337,3 @@ def as_assignment(
         case "add", (ir.DataObject() as target, ir.Operand() as by):
             return ir.Assignment(target, ir.Operation("+", (target, by)))
     return None
-
-
-def functions_in(one: ir.SourceStatement) -> Iterator[str]:
-    """Yield the names of the functions that a statement calls."""
-    for part in ir.walk(one):
-        if isinstance(part, ir.FunctionCall):
-            yield part.name

@@ -53,8 +53,7 @@ class RapidCollector(to_visits.TaskCollector):
         """Find where the arm may stop although a zone is written."""
         super().__init__(machine)
         self.base = cell_pose(machine.start.base)
-        stops = machine.find_unsure_stops()
-        self.paused = {id(machine.visits[k]) for k in stops if k >= 0}
+        self.paused = {id(machine.visits[k]) for k in machine.find_unsure_stops()}
         self.placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
 
     def arrive(self, v: RapidVisit) -> Arrival:

@@ -38,7 +38,7 @@ def test_copies_have_parts_of_their_own() -> None:
     first.write("job/t[4]", 4.0)
     assert first.parts("job/t") == ["job/t[4]"]
     assert second.parts("job/t") == ["job/t[1]", "job/t[2]"]
-    second.merge(first)
+    second = second.join(first)
     assert sorted(second.parts("job/t")) == ["job/t[1]", "job/t[2]", "job/t[4]"]
     assert first.parts("job/t") == ["job/t[4]"]
     second.drop("job/t")
@@ -53,7 +53,7 @@ def test_an_element_that_is_the_same_on_both_ways_is_known() -> None:
     for key in ARRAYS:
         other.forget(key, Nothing("read"))
         other.write(f"{key}[1]", 7.0)
-    one.merge(other)
+    one = one.join(other)
     assert [one.read(f"{key}[1]") for key in ARRAYS] == [7.0] * len(ARRAYS)
     assert all(isinstance(one.read(f"{key}[2]"), Nothing) for key in ARRAYS)
 

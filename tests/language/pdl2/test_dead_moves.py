@@ -5,7 +5,6 @@ from __future__ import annotations
 from postproc.diagnostics import Code
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.pdl2.side_effects import dead_lines
 from postproc.language.text.source import Source
 from postproc.language.visits import never_reached
 
@@ -14,10 +13,8 @@ POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 
 def lines(*body, routine=()):
     text = "\n".join(["PROGRAM a", *routine, "BEGIN", *body, "END a", ""])
-    program = parse(Source("a.pdl", text.encode()))
-    found = never_reached(
-        dead_lines([program], resolve(program).visits), "the start", "program"
-    )
+    missed = resolve(parse(Source("a.pdl", text.encode()))).missed
+    found = never_reached(missed, "the start", "program")
     assert {d.code for d in found} <= {Code.NEVER_REACHED}
     return [(d.line, int(d.message.split(": ")[1].split()[0])) for d in found]
 
