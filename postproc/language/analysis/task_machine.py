@@ -20,7 +20,6 @@ from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import (
     ControlFlow,
-    HeadedRows,
     flow_of,
     is_structural,
 )
@@ -58,7 +57,7 @@ class TaskPlace:
     """
 
     scope: Scope
-    routine: HeadedRows
+    routine: TaskRoutine
     flow: ControlFlow
     text: StatementText[Any]
     offset: int
@@ -497,7 +496,7 @@ class TaskMachine(Interpreter[Arrived]):
         if self._is_recursive(found):
             self.run_beside(found)
         calls = [one for one in calls_around(at.context) if one.place is not None]
-        running = next((one for one in calls if one.place.routine is found.rows), None)
+        running = next((one for one in calls if one.place.routine == found), None)
         if running is not None:
             begin = At(running, running.place.flow.first)
             self.enter(begin, self.at_call(running, here))
@@ -535,16 +534,16 @@ class TaskMachine(Interpreter[Arrived]):
     def _place_of(self, found: TaskRoutine, caller: At | None) -> TaskPlace:
         """Return where the statements of a routine stand that is called."""
         file, _, routine = found
-        key, text = (file, routine.first), self.texts[file]
+        key, text, inside = found.key, self.texts[file], found.inside
         if key not in self._flows:
-            rows = text.where(is_structural, routine.first + 1, routine.last)
-            handlers = text.where(self.handles, routine.first + 1, routine.last)
+            rows = text.where(is_structural, inside.start, inside.stop)
+            handlers = text.where(self.handles, inside.start, inside.stop)
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
         scope = None
         if caller and (call := self._call_of(found, caller)) is not None:
             scope = self.task.bind(found, call, scope_at(caller))
         scope = scope or self.task.scope_of(found)
-        return TaskPlace(scope, routine, self._flows[key], text, self.offsets[file])
+        return TaskPlace(scope, found, self._flows[key], text, self.offsets[file])
 
     def _call_of(self, found: TaskRoutine, caller: At) -> ir.Instruction | None:
         """Return a call whose arguments are followed; None where it has none.

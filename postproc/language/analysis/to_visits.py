@@ -237,14 +237,9 @@ class TaskCollector(Collector, ABC):
         pinned = self._find_pinned([*_goals_beside(machine)])
         self._hold_for_taught(pinned)
         return to_visits(
-            c,
-            self.files,
-            self.graph(),
-            self._pin(literals, literal, pinned),
-            literal,
-            own[np.maximum(followed, -1)][self.owner],
-            self.dialect,
-        )
+            c, self.files, self.graph(), self._pin(literals, literal, pinned), literal,
+            own[np.maximum(followed, -1)][self.owner], self.dialect,
+        )  # fmt: skip
 
     def _spread(self, own: Iterable[Any], dtype: DTypeLike) -> NDArray[Any]:
         """Return what is said of what was found, for every visit, (n, ..)."""

@@ -383,10 +383,10 @@ class KrlMachine(TaskMachine):
         ending = {own for own in here.modes.declared if own[1] == _ENDED}
         if not ending:
             return here
-        place, numbers = context.place, {number for number, _ in ending}
-        at = TaskRoutine(place.scope.file, place.scope.module, place.routine)
-        switching = self._find_routines(("on", "off"), numbers | {EVERY})
-        switches = any(one.key in switching for one in self.reach_from([at]))
+        numbers = {number for number, _ in ending} | {EVERY}
+        switching = self._find_routines(("on", "off"), numbers)
+        called = self.reach_from([context.place.routine])
+        switches = any(one.key in switching for one in called)
         if not (ending & here.modes.active or switches):
             return here
         ended = here.forget()

@@ -101,14 +101,9 @@ def read_krl(source: Source) -> KrlFile:
         head = replace(routines[0].head, local=False)
         routines[0] = replace(routines[0], head=head)
     return KrlFile(
-        text,
-        tuple(routines),
-        tuple(outline.data),
-        np.array(moves, dtype=np.int32),
-        tuple(sorted({*outline.diagnostics})),
-        name,
-        tuple(splines),
-    )
+        text, tuple(routines), tuple(outline.data), np.array(moves, dtype=np.int32),
+        tuple(sorted({*outline.diagnostics})), name, tuple(splines),
+    )  # fmt: skip
 
 
 def _index(

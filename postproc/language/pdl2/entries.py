@@ -343,16 +343,10 @@ def read_records(lines: EntryLines, records: Records) -> Entries:
     for rows, values in aux:
         stacked[rows, : values.shape[1]] = values
     return Entries(
-        Rows(NameColumn(), np.empty(0, dtype=np.int32)),
-        _names(lines, records),
-        lines.begin_line[records.first],
-        slim(layout),
-        tuple(layouts),
-        numbers,
-        slots,
-        stacked,
-        slim(arm),
-    )
+        Rows(NameColumn(), np.empty(0, dtype=np.int32)), _names(lines, records),
+        lines.begin_line[records.first], slim(layout), tuple(layouts),
+        numbers, slots, stacked, slim(arm),
+    )  # fmt: skip
 
 
 def _alike(form: Ints, records: Records) -> Iterator[Ints]:

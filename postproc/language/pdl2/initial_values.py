@@ -197,11 +197,9 @@ def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
             value = Nothing(points_of(variable.arm))
         if isinstance(value, Position) and not value.name:
             value = replace(
-                value,
-                name=variable.name,
-                taught=variable.taught,
+                value, name=variable.name, taught=variable.taught,
                 shared=bool(variable.exported),
-            )
+            )  # fmt: skip
         world.initial[key] = value
 
 

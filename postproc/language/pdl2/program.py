@@ -386,15 +386,10 @@ class _Reader:
             variables.declare([name], constant)
             return
         said = Variable(
-            "",
-            row,
-            statement.type,
-            statement.initial,
-            statement.exported,
-            "const" in statement.attributes,
-            self.lines.line(row) in self.taught,
+            "", row, statement.type, statement.initial, statement.exported,
+            "const" in statement.attributes, self.lines.line(row) in self.taught,
             self._arm(row, statement.type.arm),
-        )
+        )  # fmt: skip
         variables.declare(statement.names, said)
 
     def _before_next(self, row: int) -> None:
@@ -472,17 +467,10 @@ def parse(source: Source) -> Program:
         reader.take(row, statement)
     _close_open(reader)
     return Program(
-        reader.name,
-        lines,
-        reader.main,
-        reader.routines,
-        reader.outside,
-        reader.scopes[0].variables,
-        tuple(reader.imports),
-        reader.arm,
-        tuple(reader.diagnostics),
-        reader.nodes,
-    )
+        reader.name, lines, reader.main, reader.routines, reader.outside,
+        reader.scopes[0].variables, tuple(reader.imports), reader.arm,
+        tuple(reader.diagnostics), reader.nodes,
+    )  # fmt: skip
 
 
 def parse_again(source: Source, before: Program) -> Program:

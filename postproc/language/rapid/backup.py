@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -104,12 +105,15 @@ def _modules(folder: Path | None) -> tuple[Path, ...]:
 
 def read_mounted_arms(program: Path) -> tuple[MountedArm, ...]:
     """Return the arms of the backup that a program stands in, none where none is."""
-    for parent in list(program.absolute().parents)[:DEPTH]:
-        folder = _entry(parent, SETTINGS[0])
-        file = None if folder is None else _entry(folder, SETTINGS[1])
-        if file is not None and file.is_file():
-            return read_arms(file.read_text(encoding="latin-1"))
-    return ()
+    file = _find_settings([*program.absolute().parents][:DEPTH])
+    return () if file is None else read_arms(file.read_text(encoding="latin-1"))
+
+
+def _find_settings(places: Iterable[Path]) -> Path | None:
+    """Find ``MOC.cfg`` in the first of some folders that is a backup."""
+    folders = filter(None, (_entry(place, SETTINGS[0]) for place in places))
+    files = filter(None, (_entry(folder, SETTINGS[1]) for folder in folders))
+    return next(filter(Path.is_file, files), None)
 
 
 def read_arms(text: str) -> tuple[MountedArm, ...]:
@@ -182,19 +186,14 @@ def read_backup(folder: Path) -> Archive | None:
 
     The backup is the folder, or lies in it. Of several arms no place is given.
     """
-    inside = (
-        sorted(p for p in folder.iterdir() if p.is_dir()) if folder.is_dir() else []
-    )
-    for place in (folder, *inside):
-        settings = _entry(place, SETTINGS[0])
-        file = None if settings is None else _entry(settings, SETTINGS[1])
-        if file is not None and file.is_file():
-            text = file.read_text(encoding="latin-1")
-            arms = read_arms(text)
-            one = [arm for arm in arms if len(arms) == 1]
-            root = [tuple(record_from_pose(arm.pose[None])[0].tolist()) for arm in one]
-            shown = file.relative_to(folder).as_posix()
-            kinds = {"arms": tuple(range(1, len(arms) + 1))}
-            base = root[0] if root else ()
-            return Archive(shown, kinds, (), (), base, read_axes(text))
-    return None
+    inside = folder.iterdir() if folder.is_dir() else ()
+    file = _find_settings((folder, *sorted(p for p in inside if p.is_dir())))
+    if file is None:
+        return None
+    text, base = file.read_text(encoding="latin-1"), tuple[float, ...]()
+    arms = read_arms(text)
+    if len(arms) == 1:
+        base = tuple(record_from_pose(arms[0].pose[None])[0].tolist())
+    shown = file.relative_to(folder).as_posix()
+    kinds = {"arms": tuple(range(1, len(arms) + 1))}
+    return Archive(shown, kinds, (), (), base, read_axes(text))

@@ -173,7 +173,7 @@ class RapidMachine(TaskMachine):
     def _handlers_of(self, context: Context) -> errors.ErrorHandlers:
         """Read the error handlers of a routine once."""
         place = context.place
-        key = place.scope.file, place.routine.first
+        key = place.routine.key
         if key not in self._handlers:
             scope = replace(place.scope, given=(), loops=())
             text = self.texts[scope.file]

@@ -102,13 +102,10 @@ def read_rapid(source: Source) -> RapidFile:
     for row in (row for row in odd if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
     return RapidFile(
-        text,
-        tuple(outline.of(*_ROUTINES)),
-        tuple(outline.data),
-        np.array(moves, dtype=np.int32),
-        tuple(sorted({*outline.diagnostics})),
+        text, tuple(outline.of(*_ROUTINES)), tuple(outline.data),
+        np.array(moves, dtype=np.int32), tuple(sorted({*outline.diagnostics})),
         tuple(outline.of("module")),
-    )
+    )  # fmt: skip
 
 
 def inside(one: ir.SourceStatement) -> ir.SourceStatement:
