@@ -5,9 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import re
+import secrets
 import signal
 import stat
-import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -23,6 +23,7 @@ from postproc.operating_system import ENDING, set_mode, sync_folder
 # Writing files so that nothing is ever half written.
 
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
+NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
 STREAM = "-"  # stands for standard input or output
 
@@ -250,11 +251,19 @@ class _Temporaries:
             _unfinished.discard(name)
 
     def open(self, place: Path) -> IO[bytes]:
-        """Open a temporary file for a place."""
+        """Open a temporary file for a place.
+
+        Its name is noted before it is there: a signal may end the process in between.
+        """
+        start = f".{place.name[:100]}.{secrets.token_hex(8)}"
+        name = str(place.parent / f"{start}{TEMPORARY}")
         with self._shield.hold():
-            start = f".{place.name[:100]}."
-            handle, name = tempfile.mkstemp(TEMPORARY, start, place.parent)
             _unfinished.add(name)
+            try:
+                handle = os.open(name, NEW, 0o600)
+            except OSError:
+                _unfinished.discard(name)
+                raise
             self._ready.append((name, place))
         return os.fdopen(handle, "wb")
 

@@ -4,8 +4,9 @@ import os
 
 import pytest
 
+from postproc import files
 from postproc.exceptions import OutputError
-from postproc.files import write_all
+from postproc.files import TEMPORARY, write_all
 
 
 def test_writes_and_replaces(tmp_path):
@@ -39,6 +40,19 @@ def test_failing_rename_leaves_no_temporary(tmp_path, monkeypatch):
     with pytest.raises(OutputError):
         write_all({tmp_path / "a": b"x"})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_finds_a_temporary_file_as_soon_as_it_is_there(tmp_path, monkeypatch):
+    opened, noted = os.open, []
+
+    def note(path, *given):
+        if str(path).endswith(TEMPORARY):
+            noted.append(str(path) in files._unfinished)
+        return opened(path, *given)
+
+    monkeypatch.setattr(os, "open", note)
+    write_all({tmp_path / "a": b"x", tmp_path / "b": b"y"})
+    assert noted == [True, True] and not files._unfinished
 
 
 def test_keeps_permissions(tmp_path):

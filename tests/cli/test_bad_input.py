@@ -14,6 +14,7 @@ from resource import setrlimit
 
 import pytest
 
+from postproc.files import TEMPORARY
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
 LOOSE = "MOVE JOINT TO POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, 'S E W')"
@@ -337,10 +338,14 @@ def test_the_ending_of_a_report_decides_its_kind(desk):
 def test_a_folder_that_refuses_leaves_nothing(desk, monkeypatch, code, said):
     source = desk.put("job.pdl", program(FIRST))
 
-    def refuse(*_: object, **__: object):
-        raise OSError(code, os.strerror(code), "somewhere")
+    opened = os.open
 
-    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    def refuse(path, *given, **named):
+        if str(path).endswith(TEMPORARY):
+            raise OSError(code, os.strerror(code), "somewhere")
+        return opened(path, *given, **named)
+
+    monkeypatch.setattr("os.open", refuse)
     refused(desk.compensate(source, "-o", desk.folder / "out.pdl"), said)
     assert desk.names() == {"job.pdl"}
 
