@@ -16,6 +16,7 @@ from collections.abc import (
     Set,
 )
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -170,7 +171,7 @@ class Collector:
         found = zip(self.files, lines, strict=True)
         return {name: own.astype(np.int64) for name, own in found if len(own)}
 
-    @property
+    @cached_property
     def files(self) -> list[str]:
         """The names of the files."""
         return [text.source.name for text in self.texts]
