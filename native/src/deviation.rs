@@ -47,7 +47,7 @@ impl Comparison<'_> {
     #[inline(always)]
     fn change(&self, old: &Six, new: &Six, tool: &Three) -> Change {
         let joints = std::array::from_fn(|j| excess(new[j] - old[j], self.offset[j]));
-        if old.iter().chain(new).any(|angle| angle.is_nan()) {
+        if !are_known(old, new) {
             return Change { joints, ..UNKNOWN };
         }
         let places = displacement(&self.chain, old, new, tool);
@@ -80,6 +80,12 @@ fn columns<'py>(py: Python<'py>, changes: Vec<Change>) -> Changes<'py> {
     let joints = changes.iter().map(|change| change.joints).collect();
     let places = changes.iter().map(|change| change.places).collect();
     (array(py, joints), array(py, places), branch.into_pyarray(py))
+}
+
+/// Tell whether all joint angles of a pair are known.
+#[inline(always)]
+fn are_known(old: &Six, new: &Six) -> bool {
+    !old.iter().chain(new).any(|angle| angle.is_nan())
 }
 
 /// By how much a change lies outside of 0 to its offset; NaN stays NaN.
@@ -169,8 +175,7 @@ pub fn departure_along<'py>(
         let count = parts[edge];
         let share = |k: i64| k as f64 / count as f64;
         let there = |k: i64| (before.straight_at(share(k)), after.straight_at(share(k)));
-        let known = |(old, new): &(Six, Six)| !old.iter().chain(new).any(|q| q.is_nan());
-        let places = (1..count).map(there).filter(known);
+        let places = (1..count).map(there).filter(|(a, b)| are_known(a, b));
         places.fold(UNKNOWN, |most, (a, b)| most.largest(&with.change(&a, &b, tool)))
     };
     let one = |i: usize| {
