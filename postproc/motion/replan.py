@@ -66,6 +66,8 @@ class PatchedEdges:
 
     def join(self) -> Edges:
         """Return all edges as they are now."""
+        if not self.changes:
+            return self.edges
         edges, paths = self.edges, [self.edges.path]
         source, begin = edges.source, np.array(edges.start[:-1])
         count, size = np.diff(edges.start), len(edges.path)
