@@ -16,7 +16,7 @@ from itertools import product
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Ints, isin_sorted
 from postproc.calibration.diagnosis.candidates import (
     JointAxes,
     Library,
@@ -175,7 +175,7 @@ class MotionLaws:
         """Return the laws of some of the drivers, by their numbers."""
         widths = []
         for laws, values, which in self.widths:
-            kept = np.flatnonzero(np.isin(which, drivers))
+            kept = np.flatnonzero(isin_sorted(which, drivers))
             if len(kept):
                 own = tuple(laws[k] for k in kept)
                 widths.append((own, values[kept], which[kept]))
@@ -187,6 +187,7 @@ class MotionLaws:
         return replace(self, widths=widths)
 
 
+NO_LAWS = MotionLaws((), ())
 LawsOf = Callable[[ArmStates, str, str], list[MotionLaw]]
 
 
@@ -402,9 +403,7 @@ class Table:
         axes = JointAxes.of(view.fit, carrier.move(view.at))
         along = View(axes.size, axes.along(view.squares), axes.along(rows))
         for factor in _factors(carrier):
-            laws, each = self.laws.get(factor, MotionLaws((), ())), []
-            if self.only is not None:
-                laws = laws.some(self.only.get((carrier, factor), NONE))
+            laws, each = self._tried(carrier, factor), []
             for some, values, _ in laws.widths:
                 reduced = reduce_columns(along, (), axes.size.apply(values))
                 evidence = log_evidence(reduced, square, view.rows)
@@ -412,6 +411,13 @@ class Table:
                 each.append(evidence)
             if each:
                 yield factor, laws, tuple(each)
+
+    def _tried(self, carrier: Carrier, factor: str) -> MotionLaws:
+        """Return the laws of a factor that are tried on a carrier."""
+        if self.only is None:
+            return self.laws.get(factor, NO_LAWS)
+        drivers = self.only.get((carrier, factor), NONE)
+        return self.laws[factor].some(drivers) if len(drivers) else NO_LAWS
 
     def _shares(self, carrier: Carrier, laws: Sequence[MotionLaw]) -> Floats:
         """Return log shares of laws on a carrier, (c,); -inf of those with a name."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
@@ -311,14 +312,7 @@ class PartMotion(CarriedEffect):
         if self.order:
             turned = self.order * x
             return np.stack([np.cos(turned), np.sin(turned)], axis=1)
-        away = (x - self.middle) / self.half
-        laws = {
-            "linear": away,
-            "step": np.where(away < 0.0, -1.0, 1.0),
-            "saturating": np.tanh(away),
-            "constant": np.ones_like(x),
-        }
-        return laws[self.law][:, None]
+        return LAWS[self.law]((x - self.middle) / self.half)[:, None]
 
     def refine(self, offsets: Floats, batch: ArmStates) -> list[Effect]:
         """Move the place of a step or a bend, in parts of the range, and its width.
@@ -397,6 +391,12 @@ def _per(*drivers: str) -> str:
     return f"/({text})" if len(units) > 1 else f"/{text}" if text else ""
 
 
+LAWS: Mapping[str, Callable[[Floats], Floats]] = {
+    "linear": lambda away: away,
+    "step": lambda away: np.where(away < 0.0, -1.0, 1.0),
+    "saturating": lambda away: np.tanh(away),
+    "constant": lambda away: np.ones_like(away),
+}  # of where a covariate is, in parts of half its range from the middle
 PLACED = {"step": "a step", "saturating": "a bend"}  # laws of one place
 SHOWN = {"rad": ("urad", 1e6), "m": ("um", 1e6)}  # units people read
 
