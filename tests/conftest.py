@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from postproc.calibration.fit import fit
+from postproc.cli import YOUNG
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
@@ -59,6 +61,15 @@ points_mm = [[80.0, -40.0, 150.0], [-120.0, 60.0, 180.0], [30.0, 130.0, 320.0]]
 # would compile the package again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# The tests make hardly any cycles, as commands do: see `postproc.cli.main`.
+gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
+
+
+def pytest_collection_finish() -> None:
+    """Never search again what was loaded by now."""
+    gc.freeze()
+
 
 # Commands that the tests start are to hear signals, also where the tests run in the
 # background of a shell, or behind nohup, which let what they start ignore some.
