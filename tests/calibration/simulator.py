@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from postproc.calibration.measurements import Measurements
 from postproc.robot.arm import Arm, load_arm
@@ -28,10 +27,12 @@ HIGH = np.deg2rad([90.0, 60, -40, 150, 110, 150])
 
 def rot(axis: int, angle: float | np.ndarray) -> np.ndarray:
     """Turn about an axis, (4, 4), or by each of n angles, (n, 4, 4)."""
-    vectors = np.multiply.outer(angle, np.eye(3)[axis])
-    T = np.zeros((*vectors.shape[:-1], 4, 4))
-    T[..., :3, :3] = Rotation.from_rotvec(vectors).as_matrix()
-    T[..., 3, 3] = 1.0
+    T = np.zeros((*np.shape(angle), 4, 4))
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    T[..., a, a] = T[..., b, b] = np.cos(angle)
+    T[..., b, a] = np.sin(angle)
+    T[..., a, b] = -np.sin(angle)
+    T[..., axis, axis] = T[..., 3, 3] = 1.0
     return T
 
 

@@ -50,14 +50,13 @@ class Arc:
         self.end = self.at(1.0)
 
     def at(self, share):
-        """Place the tool on the arc, as a controller takes it along."""
-        pose = np.array(self.start)
-        swing = Rotation.from_rotvec(share * self.whole * self.normal)
-        pose[:3, 3] += swing.apply(self.radius) - self.radius
-        ends = Rotation.from_matrix(
-            np.stack([pose[:3, :3], turned(pose, self.turn)[:3, :3]])
-        )
-        pose[:3, :3] = Slerp([0.0, 1.0], ends)(share).as_matrix()
+        """Place the tool on the arc, as a controller takes it along; shares (..)."""
+        pose = np.tile(self.start, (*np.shape(share), 1, 1))
+        swing = Rotation.from_rotvec(np.multiply.outer(share, self.whole * self.normal))
+        pose[..., :3, 3] += swing.apply(self.radius) - self.radius
+        ends = np.stack([self.start, turned(self.start, self.turn)])[:, :3, :3]
+        turn = Slerp([0.0, 1.0], Rotation.from_matrix(ends))
+        pose[..., :3, :3] = turn(share).as_matrix()
         return pose
 
     def lines(self):
@@ -65,10 +64,8 @@ class Arc:
 
     def joints(self):
         """Follow it in small steps, (k, 6) [rad]."""
-        poses = [
-            self.at(s) @ np.linalg.inv(tool_pose()) for s in np.linspace(0, 1, STEPS)
-        ]
-        found = KR.inverse(np.array(poses)).q[:, int(KR.branch(self.q[None])[0])]
+        poses = self.at(np.linspace(0, 1, STEPS)) @ np.linalg.inv(tool_pose())
+        found = KR.inverse(poses).q[:, int(KR.branch(self.q[None])[0])]
         return self.q + np.angle(np.exp(1j * (found - self.q)))
 
 

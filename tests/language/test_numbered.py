@@ -45,7 +45,8 @@ def test_whole_files_are_read_as_line_by_line() -> None:
 
 def shapes_of(data: bytes) -> tuple[Statements[Any], list[str]]:
     lines = read_lines(source_from_bytes("x", data))
-    return lines, [masks_of(lines.shapes)[k] for k in lines.shape.tolist()]
+    masks = masks_of(lines.shapes)
+    return lines, [masks[k] for k in lines.shape.tolist()]
 
 
 def test_shapes_are_what_lines_say_without_numbers() -> None:

@@ -19,13 +19,10 @@ def torque(arm: Arm, q: np.ndarray, mass: np.ndarray, pull: np.ndarray) -> np.nd
         mass: Of the links, (6,) [kg].
         pull: Direction in which weight pulls, unit vector (3,), base frame.
     """
-    out = np.empty((len(q), 6))
-    for j in range(6):
-        step = np.zeros(6)
-        step[j] = STEP
-        work = _work(arm, q + step, mass, pull) - _work(arm, q - step, mass, pull)
-        out[:, j] = work / (2.0 * STEP)
-    return out
+    steps = STEP * np.concatenate([np.eye(6), -np.eye(6)])
+    work = _work(arm, (q[:, None] + steps).reshape(-1, 6), mass, pull)
+    there, back = np.split(work.reshape(-1, 12), 2, axis=1)
+    return (there - back) / (2.0 * STEP)
 
 
 def _work(arm: Arm, q: np.ndarray, mass: np.ndarray, pull: np.ndarray) -> np.ndarray:
@@ -33,16 +30,14 @@ def _work(arm: Arm, q: np.ndarray, mass: np.ndarray, pull: np.ndarray) -> np.nda
     dh, links = arm.dh, arm.file.links
     assert links is not None
     theta = dh.offset + dh.sense * (q @ dh.mix.T)
-    T, work = np.tile(np.eye(4), (len(q), 1, 1)), np.zeros(len(q))
+    cos, sin = np.cos(theta).T, np.sin(theta).T
+    work = np.zeros(len(q))
     for j, centre in enumerate(np.array(links.com_mm) * 1e-3):
-        c, s = np.cos(theta[:, j]), np.sin(theta[:, j])
-        ca, sa = np.cos(dh.alpha[j]), np.sin(dh.alpha[j])
-        A = np.zeros((len(q), 4, 4))
-        A[:, 0] = np.stack([c, -s * ca, s * sa, dh.a[j] * c], axis=1)
-        A[:, 1] = np.stack([s, c * ca, -c * sa, dh.a[j] * s], axis=1)
-        A[:, 2] = 0.0, sa, ca, dh.d[j]
-        A[:, 3, 3] = 1.0
-        T = T @ A
-        at = T[:, :3, :3] @ centre + T[:, :3, 3]
-        work += GRAVITY * mass[j] * (at @ pull)
+        x, y, z = (np.full(len(q), along) for along in centre)
+        for k in reversed(range(j + 1)):  # from the frame of a link to the one before
+            ca, sa = np.cos(dh.alpha[k]), np.sin(dh.alpha[k])
+            x = x + dh.a[k]
+            y, z = ca * y - sa * z, sa * y + ca * z + dh.d[k]
+            x, y = cos[k] * x - sin[k] * y, sin[k] * x + cos[k] * y
+        work += GRAVITY * mass[j] * (x * pull[0] + y * pull[1] + z * pull[2])
     return work

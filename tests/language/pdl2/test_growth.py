@@ -56,14 +56,14 @@ def memory_to_read(files: Files, cell) -> int:
 @pytest.mark.parametrize("write", [routines, chain])
 def test_twice_the_routines_take_twice_the_memory(write, job_cell):
     read_program(write(SMALL), job_cell)
-    half, whole = (memory_to_read(write(n), job_cell) for n in (1000, 2000))
+    half, whole = (memory_to_read(write(n), job_cell) for n in (300, 600))
     assert whole < 2.3 * half
 
 
 def test_calls_however_deep_are_followed_to_the_last(job_cell):
-    visits = read_program(chain(3000), job_cell).visits
-    assert len(visits) == 3000
-    assert visits.graph.pred.tolist() == list(range(-1, 2999))
+    visits = read_program(chain(1500), job_cell).visits
+    assert len(visits) == 1500
+    assert visits.graph.pred.tolist() == list(range(-1, 1499))
     assert len(read_program(tree(1 << 10), job_cell).visits) == (1 << 10) - 1
 
 
