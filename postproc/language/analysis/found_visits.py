@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.assigned_points import AssignedPoint, Scope
+from postproc.language.analysis.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Points,
+    Scope,
+)
 from postproc.language.analysis.origins import Origins
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
@@ -56,7 +61,7 @@ class FoundGoal:
         shift: How it is shifted from a point, None where it is not, or not known.
         stays: The point that it is made from keeps its numbers for this move.
         holds: Files and first numbers of shifts that keep their numbers for this move.
-        given: What assignments gave to the data that the move names.
+        names: Of data that assignments made it from.
         doubtful: Names of data of which only the run tells what they hold.
     """
 
@@ -73,16 +78,8 @@ class FoundGoal:
     shift: FoundShift | None = None
     stays: bool = False
     holds: frozenset[tuple[int, int]] = frozenset()
-    given: frozenset[AssignedPoint] = frozenset()
+    names: frozenset[str] = frozenset()
     doubtful: frozenset[str] = frozenset()
-
-    @property
-    def lost(self) -> FoundGoal:
-        """The goal where data that it names hold different values on the ways here."""
-        names = sorted({point.name for point in self.given})
-        why = explain_disagreement(Code.RUNTIME_VALUE, self.given)
-        goal = hold_numbers(self, self.name, why, self.pins, aux=self.aux)
-        return replace(goal, doubtful=frozenset({*names, array_of(self.name)} - {""}))
 
     @property
     def writes(self) -> tuple[int, tuple[int, ...]]:
@@ -109,13 +106,6 @@ class FoundGoal:
         The place is that of the first number, -1 where it is not written.
         """
         return self.file, max(self.slots[0], self.follows[0])
-
-
-def explain_disagreement(code: Code, given: Iterable[AssignedPoint]) -> Reason:
-    """Say that assigned data hold different values on the ways to a move."""
-    names = sorted({point.name for point in given})
-    text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
-    return Reason(code, f"{text}here, or beside them")
 
 
 def hold_numbers(
@@ -147,7 +137,7 @@ def hold_numbers(
         meaning, values or tuple(math.nan for _ in base.values), base.file,
         tuple(-1 for _ in base.values), base.origin,
         whole_name(name) if unknown else name, aux, why, pins or why.text, stays=True,
-        holds=base.holds | own,
+        holds=base.holds | own, names=base.names,
     )  # fmt: skip
 
 
@@ -225,8 +215,7 @@ class FoundVisit:
         curved: As in `Visits`.
         count: How many moves it stands for that follow each other and differ only in
             where they go: this one is the first.
-        agreed: The points that it names hold the same on every way here.
-        taken: What assignments gave to the frames and other data that it names.
+        points: What points hold where it was read.
         left: With what the program went on behind it the last time: modes, points, and
             where else the arm may come from.
     """
@@ -242,17 +231,13 @@ class FoundVisit:
     block: Hashable = None
     curved: bool = False
     count: int = 1
-    agreed: bool = True
-    taken: frozenset[AssignedPoint] = frozenset()
+    points: Points = NO_POINTS
     left: tuple[Any, Any, Origins] | None = None
 
     @property
     def row(self) -> int:
         """The row of the move in its file."""
         return self.scope.row
-
-    def meet(self, other: Self) -> None:
-        """Forget what it is carried out with otherwise on another way here."""
 
 
 def whole_name(name: str) -> str:

@@ -129,14 +129,6 @@ class GoalReader(ABC):
         """Return what reads operands that stand elsewhere."""
         return replace(self, here=here)
 
-    def end(self, operand: ir.Operand | None) -> FoundGoal:
-        """Read a destination, and note what it takes of assigned points."""
-        if not self.here.points.routines:
-            return self.goal(operand)
-        watched = self.here.points.watch()
-        goal = self.at(replace(self.here, points=watched)).goal(operand)
-        return replace(goal, given=watched.given) if watched.given else goal
-
     def goal(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a destination."""
         return self.read_special(operand) or self.plain_goal(operand)
@@ -244,6 +236,7 @@ class GoalReader(ABC):
         goal = self.unknown(AT_RUN_TIME)
         if held.operand is not None:
             goal = there.goal(held.operand)
+        goal = replace(goal, names=goal.names | held.names)
         why = []
         for place in held.chain:
             where = self.at(Scope(*place[:3], row=self.here.row))
@@ -296,7 +289,7 @@ class GoalReader(ABC):
             return FoundGoal(
                 Meaning.UNKNOWN, self.nothing, base.file, follows=base.origin,
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
-                stays=base.stays, holds=holds,
+                stays=base.stays, holds=holds, names=base.names,
             )  # fmt: skip
         aux = base.aux if by.aux is None else by.aux
         values = by.by.apply(self.dialect)
@@ -316,7 +309,7 @@ class GoalReader(ABC):
         return FoundGoal(
             Meaning.POSE, values, base.file, (-1,) * len(values), base.origin,
             base.name, aux, base.why, pins, base.shared, found,
-            holds=holds if fixed else base.holds,
+            holds=holds if fixed else base.holds, names=base.names,
         )  # fmt: skip
 
 

@@ -422,9 +422,7 @@ class TaskSymbols(ABC, Generic[F]):
             if part is None or part.index is None or argument.passed_on:
                 continue
             if not self._is_fixed(parameter, argument.value):
-                watched = replace(there, points=there.points.watch())
-                given = self._give_value(part, (), argument.value, watched)
-                points = points.give(given)
+                points = points.give(self._give_value(part, (), argument.value, there))
         return points
 
     def behind(
@@ -565,12 +563,11 @@ class TaskSymbols(ABC, Generic[F]):
     ) -> tuple[Value | None, tuple[str | ir.ElementStep, ...], str]:
         """Return what data, or an element, hold; then further steps, and their type."""
         name, steps = data.name, data.steps
-        count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
-        whole = replace(data, steps=steps[:count]) if steps[count:] else data
+        whole = _without_components(data)
         held = self.find_held(whole, here)
         if held is not None:
             value = self.evaluate_held(held, depth)
-            return value, steps[count:], self.type_of(held.place)
+            return value, steps[len(whole.steps) :], self.type_of(held.place)
         for _, operand, there in self.find_given(ir.DataObject(name), here):
             return self.value(operand, there, depth + 1), steps, ""
         if not steps and self.place(name, here) is None and name in self.constants:
@@ -725,7 +722,7 @@ class TaskSymbols(ABC, Generic[F]):
         part = self.locate(operand, here)
         if part is None or part.index is None or part.component:
             return None
-        return here.points.find((part.place, part.index))
+        return here.points.held.get((part.place, part.index))
 
     def assign(self, points: Points, one: ir.Assignment, here: Scope) -> Points:
         """Return what points hold behind an assignment.
@@ -740,7 +737,7 @@ class TaskSymbols(ABC, Generic[F]):
             return points
         if part.index is None:
             return points.forget(part.place)
-        there = replace(here, points=points.watch())
+        there = replace(here, points=points)
         return points.give(self._give_value(part, part.index, one.value, there))
 
     def _give_value(
@@ -755,20 +752,18 @@ class TaskSymbols(ABC, Generic[F]):
             return replace(
                 known, place=place, index=index, copied=copied, names=known.names | own
             )
-        names = self.names_of(value)
-        if not (part.component or self._takes_held(value, here)):
-            return AssignedPoint(place, value, plain, index, names=own | names)
+        inside = self._points_in(value, here)
+        names = self.names_of(value).union(own, *(point.names for point in inside))
+        if not part.component and self._is_steady(value, here):
+            return AssignedPoint(place, value, plain, index, names=names)
         found = self.evaluate_components(part, value, here)
         numbers = [
             Component(name, number, here.file, here.row) for name, number in found
         ]
-        names = names.union(own, *(point.names for point in points.given))
         if part.component:
             before = points.held.get((place, index))
             point = before or AssignedPoint(place, None, plain, index)
-            return point.with_components(numbers, names | own)
-        if not points.given:  # what it is given never changes
-            return AssignedPoint(place, value, plain, index, names=names)
+            return point.with_components(numbers, names)
         source = source_of(value)
         base = self.find_held(source, here)
         if base is None:
@@ -814,16 +809,27 @@ class TaskSymbols(ABC, Generic[F]):
             points = self.assign(points, one, scope)
         return None
 
-    def _takes_held(self, value: ir.Operand, here: Scope) -> bool:
-        """Return True if a value may be made from what assigned points hold."""
+    def _points_in(self, value: ir.Operand, here: Scope) -> list[AssignedPoint]:
+        """List what assignments gave to data, or elements, that a value names."""
         if not here.points.routines:
-            return False
-        if self.calls_routine(value):
+            return []
+        wholes = map(_without_components, ir.data_in(value))
+        found = (self.find_held(data, here) for data in wholes)
+        return [one for one in found if one is not None]
+
+    def _is_steady(self, value: ir.Operand, here: Scope) -> bool:
+        """Return True if no assignment on the way changes what a value is."""
+        if not here.points.routines:
             return True
-        parts = (
-            self.locate(ir.DataObject(name), here) for name in self.names_of(value)
-        )
-        return any(part and part.place in here.points for part in parts)
+        plain = self.value(value, replace(here, points=NO_POINTS))
+        return self.value(value, here) == plain
+
+
+def _without_components(data: ir.DataObject) -> ir.DataObject:
+    """Return the data, or the element, that a component belongs to."""
+    steps = data.steps
+    count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
+    return replace(data, steps=steps[:count]) if steps[count:] else data
 
 
 LARGEST = 1 << 31  # whole number that counts or names anything

@@ -588,27 +588,26 @@ class TaskMachine(Interpreter[Arrived]):
             self.keys += [(at.context, at.job_row, k) for k in range(len(found))]
             for before, after in zip(known, found[1:], strict=False):
                 after.origins = frozenset([before])
-        self._take_again(at, one, here, known)
-        for number in known:
-            visit = self.visits[number]
-            if visit.modes != here.modes:
-                visit.modes = visit.modes.join(here.modes)
-            visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
+            found[0].points = here.points
+        else:
+            self._read_again(at, one, here, known)
         first = self.visits[known[0]]
         first.origins = join_origins(first.origins, here.origins, self.lost)
         if MANY in first.origins:
             self.say(scope_at(at), Code.MANY_ORIGINS, TOLD_TOGETHER)
         return here.arriving(frozenset([known[-1]]))
 
-    def _take_again(
+    def _read_again(
         self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]
     ) -> None:
-        """Forget what visits are carried out with that differs where data do."""
-        visits = [self.visits[number] for number in known]
-        if not all(here.points.agree(visit.taken) for visit in visits):
-            again = self.read_visits(one, scope_at(at), here)
-            for visit, other in zip(visits, again, strict=True):
-                visit.meet(other)
+        """Read visits with what is known by now: the last time holds."""
+        found = before = [self.visits[number] for number in known]
+        if before[0].points != here.points:
+            found = [*self.read_visits(one, scope_at(at), here)]
+        for number, old, new in zip(known, before, found, strict=True):
+            new.modes = old.modes.join(here.modes)
+            new.origins, new.left = old.origins, old.left
+            new.points, self.visits[number] = here.points, new
 
     def assign_point(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Note what an assignment gives to a point, or to a component of it."""
@@ -797,7 +796,4 @@ def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
         at_once = machine.at_once and not machine.beside
         machine = kind(task=task, start=start, at_once=at_once)
         machine.run()
-    for visit in machine.visits:
-        if not visit.agreed:  # what it takes holds other values on other ways
-            visit.goal = visit.goal.lost
     return machine

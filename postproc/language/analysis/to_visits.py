@@ -378,8 +378,7 @@ class TaskCollector(Collector, ABC):
         copied = uncertain.keys() - elements.keys()
         for v in found:
             unknown = {v.goal.name, array_of(v.goal.name)} & copied
-            for point in v.goal.given:
-                unknown |= point.names & uncertain.keys()
+            unknown |= v.goal.names & uncertain.keys()
             if unknown:
                 place = v.goal.writes[0], v.goal.writes[1][0]
                 for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:

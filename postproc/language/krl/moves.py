@@ -124,7 +124,7 @@ class KrlGoals:
                 isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
             )
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._reader(move, here).end(move.to), SPLINE)
+            goal = not_reached(self._reader(move, here).goal(move.to), SPLINE)
             yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
             return
         there = replace(here, points=points) if points.routines else here
@@ -133,9 +133,9 @@ class KrlGoals:
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
-            goal = reader.end(move.via)
+            goal = reader.goal(move.via)
             yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
-        goal = reader.end(move.to)
+        goal = reader.goal(move.to)
         if why:
             goal = not_reached(goal, ANGLE)
         yield KrlVisit(

@@ -18,7 +18,6 @@ from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
     FoundVisit,
-    explain_disagreement,
     not_reached,
 )
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
@@ -108,17 +107,6 @@ class RapidVisit(FoundVisit):
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
-    def meet(self, other: RapidVisit) -> None:
-        """Forget tool, work object, zone, speed or load."""
-        why = explain_disagreement(Code.FRAME_UNKNOWN, self.taken)
-        for name, lost in (
-            ("tool", FrameOfMove((), True, why)), ("wobj", FrameOfMove((), False, why)),
-            ("zone_mm", UNKNOWN_ZONE), ("speed", np.nan), ("total", ()),
-        ):  # fmt: skip
-            mine, new = getattr(self, name), getattr(other, name)
-            if mine != new and (mine == mine or new == new):  # NaN is NaN
-                setattr(self, name, lost)
-
 
 @dataclass
 class Goals:
@@ -137,26 +125,22 @@ class Goals:
         """Read the visits of a move: the point of an arc, and its end."""
         signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
-        start, watched = scope, points.watch()
-        if points.routines:
-            start = replace(scope, points=points)
-        there = start if watched is points else replace(scope, points=watched)
+        there = replace(scope, points=points) if points.routines else scope
         tool, wobj, zone, speed = self._conditions(one, ends, there)
         motion = _motion(one.name, signature)
-        reader = RapidGoal(self.task, start, signature.joints, self._slots)
+        reader = RapidGoal(self.task, there, signature.joints, self._slots)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, there)
         why = why or untold
         for via in (True, False) if signature.via >= 0 else (False,):
-            goal = reader.end(ends[via])
+            goal = reader.goal(ends[via])
             if not (via or signature.reaches):
                 goal = not_reached(goal, why)
             yield RapidVisit(
                 scope, motion, via, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
-                taken=watched.given,
             )  # fmt: skip
 
     def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
