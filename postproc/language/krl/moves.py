@@ -222,7 +222,7 @@ class KrlGoal(goals.GoalReader):
             return self._step(operand)
         match operand:
             case ir.DataObject(name=name) if name in PRESENT:
-                return self._stay(name)
+                return self._stay(operand)
             case ir.DataObject(name=name) if name in BEFORE:
                 return self.unknown(no_target(goals.RUN_TIME), name)
             case ir.DataObject(name=name) if name in HOMES:
@@ -348,12 +348,14 @@ class KrlGoal(goals.GoalReader):
             for axis, value in enumerate(values, start=1)
         )
 
-    def _stay(self, name: str) -> FoundGoal:
+    def _stay(self, operand: ir.DataObject) -> FoundGoal:
         """Read a move to where the arm is: a step of nothing.
 
-        On an arc or in a spline block that is where the arc or the block begins.
+        On an arc or in a spline block that is where the arc or the block begins. What
+        data were given is where the arm was then.
         """
-        if self.in_block or self.move.via is not None:
+        name, given = operand.name, operand is not self.move.to
+        if given or self.in_block or self.move.via is not None:
             return self.unknown(no_target(goals.RUN_TIME), name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
         why = no_target("it stays where it is")

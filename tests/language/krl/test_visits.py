@@ -439,6 +439,14 @@ def test_where_the_arm_is_holds_no_target():
     assert goals == [known, known, lost, known, lost]
 
 
+def test_where_the_arm_was_is_not_where_it_is():
+    """A point keeps the place where the arm was when it was given that place."""
+    found = job("LIN XP1", "Q=$POS_ACT", "LIN XP2", "LIN Q", data=f"{DATA}DECL POS Q")
+    meanings = [Meaning.POSE, Meaning.POSE, Meaning.UNKNOWN]
+    assert found.visits.target.meaning.tolist() == meanings
+    assert "known only when the program runs" in reasons(found)[2]
+
+
 def test_home_holds_no_target():
     v = job("PTP XHOME", "PTP HOME").visits
     assert v.target.meaning.tolist() == [Meaning.HOME] * 2
