@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -280,6 +282,15 @@ class TaskSymbols(ABC, Generic[F]):
         return found
 
     @cached_property
+    def first_slots(self) -> Sequence[int]:
+        """The index of every file's first number among those of the job."""
+        return [0, *accumulate(len(file.text.numbers) for file in self.files)]
+
+    def file_of(self, slot: int) -> int:
+        """Return the file that a number stands in, -1 for none."""
+        return bisect_right(self.first_slots, slot) - 1
+
+    @cached_property
     def declared(self) -> frozenset[str]:
         """Names of all data."""
         return frozenset(datum.name for datum in self.every_datum)
@@ -521,7 +532,8 @@ class TaskSymbols(ABC, Generic[F]):
             case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 at = int(text.first[here.row]) + slot
-                return _make_number(float(text.value[at]), here.file, at)
+                own = self.first_slots[here.file] + at
+                return _make_number(float(text.value[at]), own)
             case ir.StringLiteral(text=written):
                 return written
             case ir.Composite(items=items):
@@ -855,6 +867,6 @@ def holds_odd(one: ir.SourceStatement) -> bool:
     return any(isinstance(part, ir.NotUnderstood) for part in ir.walk(one))
 
 
-def _make_number(value: float, file: int = -1, slot: int = -1) -> WrittenNumber | None:
+def _make_number(value: float, slot: int = -1) -> WrittenNumber | None:
     """Return a number, None for one that is too large for any, or none."""
-    return WrittenNumber(value, file, slot) if math.isfinite(value) else None
+    return WrittenNumber(value, slot) if math.isfinite(value) else None
