@@ -403,14 +403,22 @@ class TaskSymbols(ABC, Generic[F]):
             (parameter.name, argument.value, there)
             for parameter, argument in pairs
             if argument.value is not None
-            and (parameter.by_reference or self._is_fixed(parameter, argument.value))
+            and (
+                parameter.by_reference
+                or self._is_fixed(parameter, argument.value, there)
+            )
         )
         return replace(self.scope_of(routine), given=given)
 
-    def _is_fixed(self, parameter: ir.RoutineParameter, value: ir.Operand) -> bool:
+    def _is_fixed(
+        self, parameter: ir.RoutineParameter, value: ir.Operand, there: Scope
+    ) -> bool:
         """Return True if a parameter is a copy of what never changes, nor does it."""
-        changing = self.written | self.volatile
-        return changing.isdisjoint(self.names_of(value) | {parameter.name})
+        names, changing = self.names_of(value), self.written | self.volatile
+        called = (name for name in names if name in self.routines)
+        return changing.isdisjoint(names | {parameter.name}) and all(
+            self._is_closed(name, there) for name in called
+        )
 
     def hand_over(
         self, points: Points, routine: TaskRoutine,
@@ -432,7 +440,7 @@ class TaskSymbols(ABC, Generic[F]):
             part = self.locate(ir.DataObject(parameter.name), here)
             if part is None or part.index is None or argument.passed_on:
                 continue
-            if not self._is_fixed(parameter, argument.value):
+            if not self._is_fixed(parameter, argument.value, there):
                 points = points.give(self._give_value(part, (), argument.value, there))
         return points
 

@@ -176,6 +176,7 @@ class TaskMachine(Interpreter[Arrived]):
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _changes: dict[tuple[int, int], frozenset[str]] = field(default_factory=dict)
     _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
         default_factory=dict
     )
@@ -291,7 +292,7 @@ class TaskMachine(Interpreter[Arrived]):
         seen = seen | {routine.key}
         for caller, row, call in self._calls_by_name[head.name]:
             for there in self.scopes_of(caller, seen):
-                bound = self.task.bind(routine, call, there.at(row))
+                bound = self._bind(routine, call, there.at(row))
                 if bound is not None:
                     yield bound
 
@@ -541,9 +542,36 @@ class TaskMachine(Interpreter[Arrived]):
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
         scope = None
         if caller and (call := self._call_of(found, caller)) is not None:
-            scope = self.task.bind(found, call, scope_at(caller))
+            scope = self._bind(found, call, scope_at(caller))
         scope = scope or self.task.scope_of(found)
         return TaskPlace(scope, found, self._flows[key], text, self.offsets[file])
+
+    def _bind(
+        self, routine: TaskRoutine, call: ir.Instruction, there: Scope
+    ) -> Scope | None:
+        """Return where statements of a routine stand, as `TaskSymbols.bind`.
+
+        The call decides which element of an array a parameter stands for. Where the
+        routine may change the index, it is an unknown one.
+        """
+        bound = self.task.bind(routine, call, there)
+        if bound is None:
+            return None
+        given = []
+        for name, one, at in bound.given:
+            names = _list_indices(one).difference(dict(at.loops))
+            if names and not names.isdisjoint(self._list_changes_in(routine)):
+                assert isinstance(one, ir.DataObject)
+                one = ir.DataObject(one.name, (ir.ElementStep((ir.Operand(),)),))
+            given.append((name, one, at))
+        return replace(bound, given=tuple(given))
+
+    def _list_changes_in(self, routine: TaskRoutine) -> frozenset[str]:
+        """List names of data that a routine changes, and all that it calls."""
+        if routine.key not in self._changes:
+            part = routine.file, routine.inside.start, routine.inside.stop
+            self._changes[routine.key] = self._list_changes({part})
+        return self._changes[routine.key]
 
     def _call_of(self, found: TaskRoutine, caller: At) -> ir.Instruction | None:
         """Return a call whose arguments are followed; None where it has none.
@@ -620,11 +648,15 @@ class TaskMachine(Interpreter[Arrived]):
         return Arrived(origins, modes, Points(alike=self.task.are_alike), self.lost)
 
     def list_changed_beside(self) -> frozenset[str]:
-        """List names of data that change in ways that are not followed.
+        """List names of data that change in ways that are not followed."""
+        return self._list_changes({*self.beside, *self._list_beside()})
+
+    def _list_changes(self, parts: set[tuple[int, int, int]]) -> frozenset[str]:
+        """List names of data that statements change, as `beside`, and what they call.
 
         What a routine declares changes for nothing else.
         """
-        rows = self.rows_of({*self.beside, *self._list_beside()})
+        rows = self.rows_of(parts)
         changed = {
             data.name for at, row in rows
             for data in self.task.list_changes(self.texts[at].statement(row))
@@ -768,6 +800,13 @@ class TaskMachine(Interpreter[Arrived]):
         for row in range(first, behind):
             for at, _, one in self.calls_of(self.texts[file].statement(row)):
                 yield at, one.first, one.last
+
+
+def _list_indices(value: ir.Operand) -> set[str]:
+    """List the names of data that tell which element of an array is meant."""
+    steps = value.steps if isinstance(value, ir.DataObject) else ()
+    inside = (one for one in steps if isinstance(one, ir.ElementStep))
+    return {data.name for data in ir.data_in(*inside)}
 
 
 def scope_at(at: At, here: Arrived | None = None) -> Scope:
