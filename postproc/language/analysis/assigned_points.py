@@ -88,14 +88,12 @@ class Points:
 
     Attributes:
         held: What they are given, by key.
-        used: What of it has been asked for, by everybody who wants to know that.
         places: Places of all points in it, and maybe of others.
         routines: File, module and routine of these.
         alike: Tells whether two assignments gave the same to a point.
     """
 
     held: SharedMap[Key, AssignedPoint] = field(default_factory=SharedMap, hash=False)
-    used: tuple[set[Key], ...] = field(default=(), compare=False)
     places: SharedMap[Place, bool] = field(default_factory=SharedMap, compare=False)
     routines: frozenset[tuple[int, str, str]] = field(
         default=frozenset(), compare=False
@@ -103,23 +101,6 @@ class Points:
     alike: Callable[[AssignedPoint, AssignedPoint], bool] = field(
         default=operator.eq, compare=False
     )
-
-    def watch(self) -> Points:
-        """Return the same, which notes what is asked for from now on."""
-        return replace(self, used=(*self.used, set())) if self.routines else self
-
-    @property
-    def given(self) -> frozenset[AssignedPoint]:
-        """What has been asked for since it is watched."""
-        used = self.used[-1] if self.used else ()
-        found = (self.held.get(key) for key in used)
-        return frozenset(point for point in found if point is not None)
-
-    def find(self, key: Key) -> AssignedPoint | None:
-        """Return what a point holds, None where that is not known."""
-        for used in self.used:
-            used.add(key)
-        return self.held.get(key)
 
     def __contains__(self, place: Place) -> bool:
         """Tell whether anything may be known of a point or an array."""
@@ -133,7 +114,7 @@ class Points:
             places = places.copy()
             places[point.place] = True
             routines |= {point.place[:3]}
-        return Points(held, self.used, places, routines, self.alike)
+        return Points(held, places, routines, self.alike)
 
     def forget_shared(self) -> Points:
         """Return it with what routines declare alone: nothing else knows that."""
@@ -158,10 +139,6 @@ class Points:
             if (mine := self.held.get(key)) and not other._holds(mine)
         ]  # fmt: skip
         return self._drop(lost)
-
-    def agree(self, given: Iterable[AssignedPoint]) -> bool:
-        """Return True if points hold what is given."""
-        return all(map(self._holds, given))
 
     def _holds(self, given: AssignedPoint) -> bool:
         held = self.held.get(given.key)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.assigned_points import AssignedPoint, Scope
+from postproc.language.analysis.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Points,
+    Scope,
+)
 from postproc.language.analysis.origins import Origins
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
@@ -25,14 +30,12 @@ class FoundShift:
 
     Attributes:
         shift: The shift.
-        file: Index of the file that holds its numbers.
-        slots: Which numbers of that file they are, w as of a target, -1 where nothing
-            is written; the first one is -1 where the shift keeps its numbers.
+        slots: Which numbers of the job say it, w as of a target, -1 where nothing is
+            written; the first one is -1 where the shift keeps its numbers.
         pins: Why they must stay, "" where they need not.
     """
 
     shift: Shift
-    file: int = -1
     slots: tuple[int, ...] = (-1,)
     pins: str = ""
 
@@ -44,9 +47,8 @@ class FoundGoal:
     Attributes:
         target: What the numbers mean.
         values: w numbers, NaN where not known.
-        file: Index of the file that holds them.
-        slots: Which numbers of that file they are, -1 for those that are computed;
-            the first one tells literals apart.
+        slots: Which numbers of the job they are, -1 for those that are computed; the
+            first one tells literals apart.
         follows: Likewise of the point that it is shifted from.
         name: Of the point, "" where it is written in the move.
         aux: External axes, NaN where there is none.
@@ -55,14 +57,13 @@ class FoundGoal:
         shared: Other programs may read it too.
         shift: How it is shifted from a point, None where it is not, or not known.
         stays: The point that it is made from keeps its numbers for this move.
-        holds: Files and first numbers of shifts that keep their numbers for this move.
-        given: What assignments gave to the data that the move names.
+        holds: First numbers of shifts that keep their numbers for this move.
+        names: Of data that assignments made it from.
         doubtful: Names of data of which only the run tells what they hold.
     """
 
     target: Meaning
     values: tuple[float, ...]
-    file: int = -1
     slots: tuple[int, ...] = (-1,)
     follows: tuple[int, ...] = (-1,)
     name: str = ""
@@ -72,25 +73,17 @@ class FoundGoal:
     shared: bool = False
     shift: FoundShift | None = None
     stays: bool = False
-    holds: frozenset[tuple[int, int]] = frozenset()
-    given: frozenset[AssignedPoint] = frozenset()
+    holds: frozenset[int] = frozenset()
+    names: frozenset[str] = frozenset()
     doubtful: frozenset[str] = frozenset()
 
     @property
-    def lost(self) -> FoundGoal:
-        """The goal where data that it names hold different values on the ways here."""
-        names = sorted({point.name for point in self.given})
-        why = explain_disagreement(Code.RUNTIME_VALUE, self.given)
-        goal = hold_numbers(self, self.name, why, self.pins, aux=self.aux)
-        return replace(goal, doubtful=frozenset({*names, array_of(self.name)} - {""}))
-
-    @property
-    def writes(self) -> tuple[int, tuple[int, ...]]:
-        """The file and the numbers in it that may be written anew for this move."""
+    def writes(self) -> tuple[int, ...]:
+        """The numbers that may be written anew for this move."""
         if self.is_rewritten_by_shift:
             assert self.shift is not None
-            return self.shift.file, self.shift.slots
-        return self.file, self.slots
+            return self.shift.slots
+        return self.slots
 
     @property
     def is_rewritten_by_shift(self) -> bool:
@@ -103,19 +96,9 @@ class FoundGoal:
         return self.follows if self.slots[0] < 0 <= self.follows[0] else self.slots
 
     @property
-    def point(self) -> tuple[int, int]:
-        """The file of its point, or the point that it is shifted from, and its place.
-
-        The place is that of the first number, -1 where it is not written.
-        """
-        return self.file, max(self.slots[0], self.follows[0])
-
-
-def explain_disagreement(code: Code, given: Iterable[AssignedPoint]) -> Reason:
-    """Say that assigned data hold different values on the ways to a move."""
-    names = sorted({point.name for point in given})
-    text = f"{', '.join(names[:MOST_NAMED])} is given different values on the ways "
-    return Reason(code, f"{text}here, or beside them")
+    def point(self) -> int:
+        """The first number of its point, or of what it is shifted from; -1 for none."""
+        return max(self.slots[0], self.follows[0])
 
 
 def hold_numbers(
@@ -138,16 +121,13 @@ def hold_numbers(
         values: Numbers of the goal, none where they are not known.
         aux: External axes.
     """
-    own = set[tuple[int, int]]()
-    if base.is_rewritten_by_shift:
-        file, slots = base.writes
-        own = {(file, slots[0])}
+    own = {base.writes[0]} if base.is_rewritten_by_shift else set[int]()
     unknown = meaning == Meaning.UNKNOWN and base.origin[0] < 0
     return FoundGoal(
-        meaning, values or tuple(math.nan for _ in base.values), base.file,
+        meaning, values or tuple(math.nan for _ in base.values),
         tuple(-1 for _ in base.values), base.origin,
         whole_name(name) if unknown else name, aux, why, pins or why.text, stays=True,
-        holds=base.holds | own,
+        holds=base.holds | own, names=base.names,
     )  # fmt: skip
 
 
@@ -201,11 +181,9 @@ def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
         goal: What the move names.
         why: Why it need not reach it.
     """
-    numbers = (max(goal.slots[0], goal.follows[0]),)
     return FoundGoal(
-        Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), goal.file,
-        follows=numbers, name=goal.name, aux=goal.aux, why=why,
-        pins=goal.pins or why.text,
+        Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), follows=(goal.point,),
+        name=goal.name, aux=goal.aux, why=why, pins=goal.pins or why.text,
     )  # fmt: skip
 
 
@@ -225,8 +203,7 @@ class FoundVisit:
         curved: As in `Visits`.
         count: How many moves it stands for that follow each other and differ only in
             where they go: this one is the first.
-        agreed: The points that it names hold the same on every way here.
-        taken: What assignments gave to the frames and other data that it names.
+        points: What points hold where it was read.
         left: With what the program went on behind it the last time: modes, points, and
             where else the arm may come from.
     """
@@ -242,17 +219,13 @@ class FoundVisit:
     block: Hashable = None
     curved: bool = False
     count: int = 1
-    agreed: bool = True
-    taken: frozenset[AssignedPoint] = frozenset()
+    points: Points = NO_POINTS
     left: tuple[Any, Any, Origins] | None = None
 
     @property
     def row(self) -> int:
         """The row of the move in its file."""
         return self.scope.row
-
-    def meet(self, other: Self) -> None:
-        """Forget what it is carried out with otherwise on another way here."""
 
 
 def whole_name(name: str) -> str:

@@ -39,16 +39,15 @@ class ReadShift:
 
     Attributes:
         by: What by, None where that is not known.
-        file, slots: Where its numbers stand, w as of a target; -1 where they stay.
-        own: File and first number of a shift that stands in the move itself.
+        slots: Its numbers among those of the job, w as of a target; -1 where they stay.
+        own: First number of a shift that stands in the move itself.
         aux: External axes of the shifted point, None where they are those of the point.
         shifts, turned: What messages say that it does: shift by what .., turn.
     """
 
     by: Shift | None = None
-    file: int = -1
     slots: tuple[int, ...] = (-1,)
-    own: frozenset[tuple[int, int]] = frozenset()
+    own: frozenset[int] = frozenset()
     aux: tuple[float, ...] | None = None
     shifts: str = ""
     turned: str = ""
@@ -90,12 +89,12 @@ class GoalReader(ABC):
         """Say why a name stands for no known point."""
 
     @abstractmethod
-    def explain_pinned(self, name: str, file: int) -> str:
+    def explain_pinned(self, name: str, slot: int) -> str:
         """Say why a point must keep its numbers, "" where it need not.
 
         Args:
             name: Of the point.
-            file: Where its numbers stand, -1 for nowhere.
+            slot: Its first number, -1 where none is written.
         """
 
     def is_shared(self, name: str) -> bool:
@@ -129,14 +128,6 @@ class GoalReader(ABC):
         """Return what reads operands that stand elsewhere."""
         return replace(self, here=here)
 
-    def end(self, operand: ir.Operand | None) -> FoundGoal:
-        """Read a destination, and note what it takes of assigned points."""
-        if not self.here.points.routines:
-            return self.goal(operand)
-        watched = self.here.points.watch()
-        goal = self.at(replace(self.here, points=watched)).goal(operand)
-        return replace(goal, given=watched.given) if watched.given else goal
-
     def goal(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a destination."""
         return self.read_special(operand) or self.plain_goal(operand)
@@ -147,7 +138,7 @@ class GoalReader(ABC):
         if held is not None:
             return self._read_held(held)
         found = self._read(operand)
-        if found.pins or found.file < 0 or not self.task.files[found.file].is_system:
+        if found.pins or not self.is_of_system(found.point):
             return found
         return replace(found, pins=self.system)
 
@@ -195,15 +186,15 @@ class GoalReader(ABC):
             return replace(goal, name=name)
         if not (name or goal.slots[0] >= 0):
             return goal
-        if goal.file >= 0 and not self._is_own(goal, operand):
-            goal = replace(goal, file=-1, slots=(-1,) * len(goal.slots))
+        if goal.slots[0] >= 0 and not self._is_own(goal, operand):
+            goal = replace(goal, slots=(-1,) * len(goal.slots))
             goal = replace(goal, why=goal.why or COMPUTED)
         return self.name_goal(goal, name, self._spell_steps(operand)) if name else goal
 
     def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
         """Return the goal of a move that names data, and elements of them."""
         return replace(
-            goal, name=name + steps, pins=self.explain_pinned(name, goal.file),
+            goal, name=name + steps, pins=self.explain_pinned(name, goal.point),
             shared=self.is_shared(name),
         )  # fmt: skip
 
@@ -218,10 +209,16 @@ class GoalReader(ABC):
             found = self.task.constant(operand.name, self.here, index)
             found = found or self.task.constant(operand.name, self.here)
             file, row = (found[0], found[1].row) if found else (-1, -1)
-        if goal.file != file:
+        if file < 0:
             return False
         first, behind = self.task.files[file].text.first[row : row + 2].tolist()
-        return all(first <= slot < behind for slot in goal.slots if slot >= 0)
+        begin = self.task.first_slots[file]
+        own = range(begin + first, begin + behind)
+        return all(slot in own for slot in goal.slots if slot >= 0)
+
+    def is_of_system(self, slot: int) -> bool:
+        """Return True if a number stands in a file that is read and not rewritten."""
+        return slot >= 0 and self.task.files[self.task.file_of(slot)].is_system
 
     def _index(self, step: str | ir.ElementStep) -> tuple[int, ...] | None:
         return self.task.index(step, self.here)
@@ -244,10 +241,11 @@ class GoalReader(ABC):
         goal = self.unknown(AT_RUN_TIME)
         if held.operand is not None:
             goal = there.goal(held.operand)
+        goal = replace(goal, names=goal.names | held.names)
         why = []
         for place in held.chain:
             where = self.at(Scope(*place[:3], row=self.here.row))
-            why.append(where.explain_pinned(place[-1], goal.file))
+            why.append(where.explain_pinned(place[-1], goal.point))
         why += self.explain_kept(held)
         pins = next(filter(None, (goal.pins, *why)), "")
         if held.components:
@@ -294,9 +292,9 @@ class GoalReader(ABC):
         if base.target != Meaning.POSE or by.by is None:
             pins = base.pins or f"{by.shifts} {RUN_TIME}"
             return FoundGoal(
-                Meaning.UNKNOWN, self.nothing, base.file, follows=base.origin,
+                Meaning.UNKNOWN, self.nothing, follows=base.origin,
                 name=base.name, why=base.why or AT_RUN_TIME, pins=pins,
-                stays=base.stays, holds=holds,
+                stays=base.stays, holds=holds, names=base.names,
             )  # fmt: skip
         aux = base.aux if by.aux is None else by.aux
         values = by.by.apply(self.dialect)
@@ -309,28 +307,25 @@ class GoalReader(ABC):
         if base.shift is not None:
             found = FoundShift(by.by.around(base.shift.shift, self.dialect))
         if not base.why and base.origin[0] >= 0 and by.slots[0] >= 0:
-            pins = self.system if self.task.files[by.file].is_system else ""
-            found = FoundShift(found.shift, by.file, by.slots, pins)
+            pins = self.system if self.is_of_system(by.slots[0]) else ""
+            found = FoundShift(found.shift, by.slots, pins)
         fixed = found.slots[0] < 0
         pins = base.pins or (by.turned if by.by.turns and fixed else "")
         return FoundGoal(
-            Meaning.POSE, values, base.file, (-1,) * len(values), base.origin,
+            Meaning.POSE, values, (-1,) * len(values), base.origin,
             base.name, aux, base.why, pins, base.shared, found,
-            holds=holds if fixed else base.holds,
+            holds=holds if fixed else base.holds, names=base.names,
         )  # fmt: skip
 
 
-def locate_numbers(
-    numbers: Sequence[WrittenNumber], width: int
-) -> tuple[int, tuple[int, ...]]:
-    """Return the file of numbers and their places, -1 where one is computed.
+def list_slots(numbers: Sequence[WrittenNumber], width: int) -> tuple[int, ...]:
+    """Return where numbers stand, -1 where one of them is computed.
 
     Args:
         numbers: The numbers.
         width: How many places there are.
     """
-    files = {one.file if one.slot >= 0 else -1 for one in numbers}
-    if len(files) != 1 or -1 in files:
-        return -1, (-1,) * width
     slots = tuple(one.slot for one in numbers)
-    return files.pop(), slots + (-1,) * (width - len(slots))
+    if min(slots, default=-1) < 0:
+        return (-1,) * width
+    return slots + (-1,) * (width - len(slots))

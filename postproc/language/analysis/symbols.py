@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -280,6 +282,15 @@ class TaskSymbols(ABC, Generic[F]):
         return found
 
     @cached_property
+    def first_slots(self) -> Sequence[int]:
+        """The index of every file's first number among those of the job."""
+        return [0, *accumulate(len(file.text.numbers) for file in self.files)]
+
+    def file_of(self, slot: int) -> int:
+        """Return the file that a number stands in, -1 for none."""
+        return bisect_right(self.first_slots, slot) - 1
+
+    @cached_property
     def declared(self) -> frozenset[str]:
         """Names of all data."""
         return frozenset(datum.name for datum in self.every_datum)
@@ -392,14 +403,22 @@ class TaskSymbols(ABC, Generic[F]):
             (parameter.name, argument.value, there)
             for parameter, argument in pairs
             if argument.value is not None
-            and (parameter.by_reference or self._is_fixed(parameter, argument.value))
+            and (
+                parameter.by_reference
+                or self._is_fixed(parameter, argument.value, there)
+            )
         )
         return replace(self.scope_of(routine), given=given)
 
-    def _is_fixed(self, parameter: ir.RoutineParameter, value: ir.Operand) -> bool:
+    def _is_fixed(
+        self, parameter: ir.RoutineParameter, value: ir.Operand, there: Scope
+    ) -> bool:
         """Return True if a parameter is a copy of what never changes, nor does it."""
-        changing = self.written | self.volatile
-        return changing.isdisjoint(self.names_of(value) | {parameter.name})
+        names, changing = self.names_of(value), self.written | self.volatile
+        called = (name for name in names if name in self.routines)
+        return changing.isdisjoint(names | {parameter.name}) and all(
+            self._is_closed(name, there) for name in called
+        )
 
     def hand_over(
         self, points: Points, routine: TaskRoutine,
@@ -421,10 +440,8 @@ class TaskSymbols(ABC, Generic[F]):
             part = self.locate(ir.DataObject(parameter.name), here)
             if part is None or part.index is None or argument.passed_on:
                 continue
-            if not self._is_fixed(parameter, argument.value):
-                watched = replace(there, points=there.points.watch())
-                given = self._give_value(part, (), argument.value, watched)
-                points = points.give(given)
+            if not self._is_fixed(parameter, argument.value, there):
+                points = points.give(self._give_value(part, (), argument.value, there))
         return points
 
     def behind(
@@ -523,7 +540,8 @@ class TaskSymbols(ABC, Generic[F]):
             case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 at = int(text.first[here.row]) + slot
-                return _make_number(float(text.value[at]), here.file, at)
+                own = self.first_slots[here.file] + at
+                return _make_number(float(text.value[at]), own)
             case ir.StringLiteral(text=written):
                 return written
             case ir.Composite(items=items):
@@ -565,12 +583,11 @@ class TaskSymbols(ABC, Generic[F]):
     ) -> tuple[Value | None, tuple[str | ir.ElementStep, ...], str]:
         """Return what data, or an element, hold; then further steps, and their type."""
         name, steps = data.name, data.steps
-        count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
-        whole = replace(data, steps=steps[:count]) if steps[count:] else data
+        whole = _without_components(data)
         held = self.find_held(whole, here)
         if held is not None:
             value = self.evaluate_held(held, depth)
-            return value, steps[count:], self.type_of(held.place)
+            return value, steps[len(whole.steps) :], self.type_of(held.place)
         for _, operand, there in self.find_given(ir.DataObject(name), here):
             return self.value(operand, there, depth + 1), steps, ""
         if not steps and self.place(name, here) is None and name in self.constants:
@@ -725,7 +742,7 @@ class TaskSymbols(ABC, Generic[F]):
         part = self.locate(operand, here)
         if part is None or part.index is None or part.component:
             return None
-        return here.points.find((part.place, part.index))
+        return here.points.held.get((part.place, part.index))
 
     def assign(self, points: Points, one: ir.Assignment, here: Scope) -> Points:
         """Return what points hold behind an assignment.
@@ -740,7 +757,7 @@ class TaskSymbols(ABC, Generic[F]):
             return points
         if part.index is None:
             return points.forget(part.place)
-        there = replace(here, points=points.watch())
+        there = replace(here, points=points)
         return points.give(self._give_value(part, part.index, one.value, there))
 
     def _give_value(
@@ -755,20 +772,18 @@ class TaskSymbols(ABC, Generic[F]):
             return replace(
                 known, place=place, index=index, copied=copied, names=known.names | own
             )
-        names = self.names_of(value)
-        if not (part.component or self._takes_held(value, here)):
-            return AssignedPoint(place, value, plain, index, names=own | names)
+        inside = self._points_in(value, here)
+        names = self.names_of(value).union(own, *(point.names for point in inside))
+        if not part.component and self._is_steady(value, here):
+            return AssignedPoint(place, value, plain, index, names=names)
         found = self.evaluate_components(part, value, here)
         numbers = [
             Component(name, number, here.file, here.row) for name, number in found
         ]
-        names = names.union(own, *(point.names for point in points.given))
         if part.component:
             before = points.held.get((place, index))
             point = before or AssignedPoint(place, None, plain, index)
-            return point.with_components(numbers, names | own)
-        if not points.given:  # what it is given never changes
-            return AssignedPoint(place, value, plain, index, names=names)
+            return point.with_components(numbers, names)
         source = source_of(value)
         base = self.find_held(source, here)
         if base is None:
@@ -814,16 +829,27 @@ class TaskSymbols(ABC, Generic[F]):
             points = self.assign(points, one, scope)
         return None
 
-    def _takes_held(self, value: ir.Operand, here: Scope) -> bool:
-        """Return True if a value may be made from what assigned points hold."""
+    def _points_in(self, value: ir.Operand, here: Scope) -> list[AssignedPoint]:
+        """List what assignments gave to data, or elements, that a value names."""
         if not here.points.routines:
-            return False
-        if self.calls_routine(value):
+            return []
+        wholes = map(_without_components, ir.data_in(value))
+        found = (self.find_held(data, here) for data in wholes)
+        return [one for one in found if one is not None]
+
+    def _is_steady(self, value: ir.Operand, here: Scope) -> bool:
+        """Return True if no assignment on the way changes what a value is."""
+        if not here.points.routines:
             return True
-        parts = (
-            self.locate(ir.DataObject(name), here) for name in self.names_of(value)
-        )
-        return any(part and part.place in here.points for part in parts)
+        plain = self.value(value, replace(here, points=NO_POINTS))
+        return self.value(value, here) == plain
+
+
+def _without_components(data: ir.DataObject) -> ir.DataObject:
+    """Return the data, or the element, that a component belongs to."""
+    steps = data.steps
+    count = next((k for k, s in enumerate(steps) if isinstance(s, str)), len(steps))
+    return replace(data, steps=steps[:count]) if steps[count:] else data
 
 
 LARGEST = 1 << 31  # whole number that counts or names anything
@@ -849,6 +875,6 @@ def holds_odd(one: ir.SourceStatement) -> bool:
     return any(isinstance(part, ir.NotUnderstood) for part in ir.walk(one))
 
 
-def _make_number(value: float, file: int = -1, slot: int = -1) -> WrittenNumber | None:
+def _make_number(value: float, slot: int = -1) -> WrittenNumber | None:
     """Return a number, None for one that is too large for any, or none."""
-    return WrittenNumber(value, file, slot) if math.isfinite(value) else None
+    return WrittenNumber(value, slot) if math.isfinite(value) else None

@@ -176,6 +176,7 @@ class TaskMachine(Interpreter[Arrived]):
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
     _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _changes: dict[tuple[int, int], frozenset[str]] = field(default_factory=dict)
     _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
         default_factory=dict
     )
@@ -291,7 +292,7 @@ class TaskMachine(Interpreter[Arrived]):
         seen = seen | {routine.key}
         for caller, row, call in self._calls_by_name[head.name]:
             for there in self.scopes_of(caller, seen):
-                bound = self.task.bind(routine, call, there.at(row))
+                bound = self._bind(routine, call, there.at(row))
                 if bound is not None:
                     yield bound
 
@@ -541,9 +542,36 @@ class TaskMachine(Interpreter[Arrived]):
             self._flows[key] = flow_of(text.statement, rows, routine, handlers)
         scope = None
         if caller and (call := self._call_of(found, caller)) is not None:
-            scope = self.task.bind(found, call, scope_at(caller))
+            scope = self._bind(found, call, scope_at(caller))
         scope = scope or self.task.scope_of(found)
         return TaskPlace(scope, found, self._flows[key], text, self.offsets[file])
+
+    def _bind(
+        self, routine: TaskRoutine, call: ir.Instruction, there: Scope
+    ) -> Scope | None:
+        """Return where statements of a routine stand, as `TaskSymbols.bind`.
+
+        The call decides which element of an array a parameter stands for. Where the
+        routine may change the index, it is an unknown one.
+        """
+        bound = self.task.bind(routine, call, there)
+        if bound is None:
+            return None
+        given = []
+        for name, one, at in bound.given:
+            names = _list_indices(one).difference(dict(at.loops))
+            if names and not names.isdisjoint(self._list_changes_in(routine)):
+                assert isinstance(one, ir.DataObject)
+                one = ir.DataObject(one.name, (ir.ElementStep((ir.Operand(),)),))
+            given.append((name, one, at))
+        return replace(bound, given=tuple(given))
+
+    def _list_changes_in(self, routine: TaskRoutine) -> frozenset[str]:
+        """List names of data that a routine changes, and all that it calls."""
+        if routine.key not in self._changes:
+            part = routine.file, routine.inside.start, routine.inside.stop
+            self._changes[routine.key] = self._list_changes({part})
+        return self._changes[routine.key]
 
     def _call_of(self, found: TaskRoutine, caller: At) -> ir.Instruction | None:
         """Return a call whose arguments are followed; None where it has none.
@@ -588,27 +616,26 @@ class TaskMachine(Interpreter[Arrived]):
             self.keys += [(at.context, at.job_row, k) for k in range(len(found))]
             for before, after in zip(known, found[1:], strict=False):
                 after.origins = frozenset([before])
-        self._take_again(at, one, here, known)
-        for number in known:
-            visit = self.visits[number]
-            if visit.modes != here.modes:
-                visit.modes = visit.modes.join(here.modes)
-            visit.agreed = visit.agreed and here.points.agree(visit.goal.given)
+            found[0].points = here.points
+        else:
+            self._read_again(at, one, here, known)
         first = self.visits[known[0]]
         first.origins = join_origins(first.origins, here.origins, self.lost)
         if MANY in first.origins:
             self.say(scope_at(at), Code.MANY_ORIGINS, TOLD_TOGETHER)
         return here.arriving(frozenset([known[-1]]))
 
-    def _take_again(
+    def _read_again(
         self, at: At, one: ir.SourceStatement, here: Arrived, known: Sequence[int]
     ) -> None:
-        """Forget what visits are carried out with that differs where data do."""
-        visits = [self.visits[number] for number in known]
-        if not all(here.points.agree(visit.taken) for visit in visits):
-            again = self.read_visits(one, scope_at(at), here)
-            for visit, other in zip(visits, again, strict=True):
-                visit.meet(other)
+        """Read visits with what is known by now: the last time holds."""
+        found = before = [self.visits[number] for number in known]
+        if before[0].points != here.points:
+            found = [*self.read_visits(one, scope_at(at), here)]
+        for number, old, new in zip(known, before, found, strict=True):
+            new.modes = old.modes.join(here.modes)
+            new.origins, new.left = old.origins, old.left
+            new.points, self.visits[number] = here.points, new
 
     def assign_point(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Note what an assignment gives to a point, or to a component of it."""
@@ -621,11 +648,15 @@ class TaskMachine(Interpreter[Arrived]):
         return Arrived(origins, modes, Points(alike=self.task.are_alike), self.lost)
 
     def list_changed_beside(self) -> frozenset[str]:
-        """List names of data that change in ways that are not followed.
+        """List names of data that change in ways that are not followed."""
+        return self._list_changes({*self.beside, *self._list_beside()})
+
+    def _list_changes(self, parts: set[tuple[int, int, int]]) -> frozenset[str]:
+        """List names of data that statements change, as `beside`, and what they call.
 
         What a routine declares changes for nothing else.
         """
-        rows = self.rows_of({*self.beside, *self._list_beside()})
+        rows = self.rows_of(parts)
         changed = {
             data.name for at, row in rows
             for data in self.task.list_changes(self.texts[at].statement(row))
@@ -771,6 +802,13 @@ class TaskMachine(Interpreter[Arrived]):
                 yield at, one.first, one.last
 
 
+def _list_indices(value: ir.Operand) -> set[str]:
+    """List the names of data that tell which element of an array is meant."""
+    steps = value.steps if isinstance(value, ir.DataObject) else ()
+    inside = (one for one in steps if isinstance(one, ir.ElementStep))
+    return {data.name for data in ir.data_in(*inside)}
+
+
 def scope_at(at: At, here: Arrived | None = None) -> Scope:
     """Return where a statement stands, with what points hold there if that counts."""
     points = NO_POINTS if here is None else here.points
@@ -797,7 +835,4 @@ def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
         at_once = machine.at_once and not machine.beside
         machine = kind(task=task, start=start, at_once=at_once)
         machine.run()
-    for visit in machine.visits:
-        if not visit.agreed:  # what it takes holds other values on other ways
-            visit.goal = visit.goal.lost
     return machine

@@ -210,11 +210,10 @@ class TaskCollector(Collector, ABC):
         """Find what counts for several: it is filled for all of them."""
         super().__init__(machine, machine.texts)
         self.owner, self.inside = within(self.counts)  # of each visit: (n,)
-        first = dict[tuple[int, int], int]()  # by the numbers that moves write
+        first = dict[int, int]()  # by the numbers that moves write
         for k, v in enumerate(self.found):
-            file, slots = v.goal.writes
-            if slots[0] >= 0:
-                first.setdefault((file, slots[0]), k)
+            if v.goal.writes[0] >= 0:
+                first.setdefault(v.goal.writes[0], k)
         self.index = {place: k for k, place in enumerate(first)}
         self.example = [*first.values()]
 
@@ -278,22 +277,22 @@ class TaskCollector(Collector, ABC):
         """Fill which numbers are those of a target; of runs also what they are."""
         c = self.columns
         for k, v in enumerate(self.found):
-            file, slots = v.goal.writes
-            if slots[0] < 0:
+            own = np.array(v.goal.writes)
+            if own[0] < 0:
                 continue
             rows = slice(self.begin[k], self.begin[k] + v.count)
-            own = np.array(slots)
-            is_written, base = own >= 0, int(self.numbering.first[file])
+            is_written = own >= 0
             if v.count == 1:
-                c.slots[rows.start, is_written] = own[is_written] + base
+                c.slots[rows.start, is_written] = own[is_written]
                 continue
-            text = self.machine.texts[file]
+            text = self.machine.texts[v.scope.file]
+            base = int(self.numbering.first[v.scope.file])
             stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
             steps = stride * np.arange(v.count)
             for at in np.flatnonzero(is_written).tolist():  # one by one: short of room
                 places = own[at] + steps
-                c.slots[rows, at] = places + base
-                c.values[rows, at] = text.value[places]
+                c.slots[rows, at] = places
+                c.values[rows, at] = text.value[places - base]
 
     def _fill_conditions(self, arrivals: Sequence[Arrival], followed: Ints) -> None:
         """Fill what moves are carried out with, and why they must stay."""
@@ -367,22 +366,20 @@ class TaskCollector(Collector, ABC):
             name: ANY_VALUE.format(name) for v in found for name in v.goal.doubtful
         }
         stays = {goal.point: why for goal, why in other}
-        stays |= {(f, slots[0]): why for g, why in other for f, slots in [g.writes]}
+        stays |= {goal.writes[0]: why for goal, why in other}
         pinned = []
         for v in (found[k] for k in self.example):
-            file, slots = v.goal.writes
             by = v.goal.shift if v.goal.is_rewritten_by_shift else None
             own = elements.get(array_of(v.goal.name), "") if by is None else by.pins
-            pinned.append(stays.get((file, slots[0]), "") or own)
+            pinned.append(stays.get(v.goal.writes[0], "") or own)
         uncertain = _find_uncertain({*elements}, self.machine.task.uses.copies)
         copied = uncertain.keys() - elements.keys()
         for v in found:
             unknown = {v.goal.name, array_of(v.goal.name)} & copied
-            for point in v.goal.given:
-                unknown |= point.names & uncertain.keys()
+            unknown |= v.goal.names & uncertain.keys()
             if unknown:
-                place = v.goal.writes[0], v.goal.writes[1][0]
-                for at in {index.get(v.goal.point, -1), index.get(place, -1)} - {-1}:
+                places = v.goal.point, v.goal.writes[0]
+                for at in {index.get(place, -1) for place in places} - {-1}:
                     pinned[at] = pinned[at] or uncertain[min(unknown)]
             at = index.get(v.goal.point, -1)
             if at >= 0:
@@ -407,8 +404,8 @@ class TaskCollector(Collector, ABC):
         if not (any(self.machine.task.taught_lines) or taught):
             return [False] * len(self.found)
         goals = [v.goal for v in self.found]
-        places = [{(one.writes[0], one.writes[1][0]), one.point} for one in goals]
-        written = {place for some in places for place in some if place[1] >= 0}
+        places = [{one.writes[0], one.point} for one in goals]
+        written = {place for some in places for place in some if place >= 0}
         marked = _find_marked(written, self.machine)
         return [
             whole_name(one.name).strip().lower() in taught
@@ -467,25 +464,24 @@ def _goals_beside(machine: TaskMachine) -> Iterator[tuple[FoundGoal, str]]:
             yield goal, why
 
 
-def _find_marked(
-    places: Collection[tuple[int, int]], machine: TaskMachine
-) -> set[tuple[int, int]]:
-    """Find the targets, by file and first number, that a comment marks as taught.
+def _find_marked(places: Collection[int], machine: TaskMachine) -> set[int]:
+    """Find the targets, by their first numbers, that a comment marks as taught.
 
     It speaks of those whose numbers stand on its line; where none do, of all in its
     statement.
     """
-    found = set[tuple[int, int]]()
+    found, begins = set[int](), machine.task.first_slots
     for file, lines in enumerate(machine.task.taught_lines):
-        text = machine.texts[file]
-        own = sorted(slot for at, slot in places if at == file) if lines else []
+        text, (begin, behind) = machine.texts[file], begins[file : file + 2]
+        inside = (slot - begin for slot in places if begin <= slot < behind)
+        own = sorted(inside) if lines else []
         rows, of_row = {slot: text.row_of(slot) for slot in own}, defaultdict(list)
         for slot in own:
             of_row[rows[slot]].append(slot)
         for line in lines if own else ():
             there = _on_line(own, rows, text, line)
             near = (slot for row in text.rows_on(line) for slot in of_row[row])
-            found |= {(file, slot) for slot in there or near}
+            found |= {begin + slot for slot in there or near}
     return found
 
 

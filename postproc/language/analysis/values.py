@@ -8,18 +8,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class WrittenNumber:
     """A number: its value, and where it is written.
 
     Attributes:
-        value: Its value.
-        file, slot: Where it stands; slot -1 where it is computed.
+        value: Its value, NaN where it is not known.
+        slot: Index of the number among those of the job, -1 where it is computed.
+        along: It is the number of its slot plus a constant.
     """
 
     value: float
-    file: int = -1
     slot: int = -1
+    along: bool = False
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ class KrlGoals:
                 isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
             )
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._reader(move, here).end(move.to), SPLINE)
+            goal = not_reached(self._reader(move, here).goal(move.to), SPLINE)
             yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
             return
         there = replace(here, points=points) if points.routines else here
@@ -133,9 +133,9 @@ class KrlGoals:
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
-            goal = reader.end(move.via)
+            goal = reader.goal(move.via)
             yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
-        goal = reader.end(move.to)
+        goal = reader.goal(move.to)
         if why:
             goal = not_reached(goal, ANGLE)
         yield KrlVisit(
@@ -222,7 +222,7 @@ class KrlGoal(goals.GoalReader):
             return self._step(operand)
         match operand:
             case ir.DataObject(name=name) if name in PRESENT:
-                return self._stay(name)
+                return self._stay(operand)
             case ir.DataObject(name=name) if name in BEFORE:
                 return self.unknown(no_target(goals.RUN_TIME), name)
             case ir.DataObject(name=name) if name in HOMES:
@@ -253,10 +253,10 @@ class KrlGoal(goals.GoalReader):
         code, text = self.task.explain_unknown(name, self.here)
         return Reason(code, f"{name} {text}")
 
-    def explain_pinned(self, name: str, file: int) -> str:
+    def explain_pinned(self, name: str, slot: int) -> str:
         """Say why a point must keep its numbers."""
-        if file >= 0 and self.task.files[file].is_system:
-            place = self.task.files[file].text.source.name
+        if self.is_of_system(slot):
+            place = self.task.files[self.task.file_of(slot)].text.source.name
             return f"{name} stands in {place}, which all programs share"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
@@ -281,11 +281,11 @@ class KrlGoal(goals.GoalReader):
             return self.unknown(NOT_BY_JOINTS)
         if numbers is None:
             return self._partial(found, symbols.AXES, Meaning.PARTIAL_JOINTS)
-        file, slots = goals.locate_numbers(numbers, pose_encoding.WIDTH)
+        slots = goals.list_slots(numbers, pose_encoding.WIDTH)
         values = [number.value for number in numbers]
-        why = NO_REASON if file >= 0 else goals.COMPUTED
+        why = NO_REASON if slots[0] >= 0 else goals.COMPUTED
         return FoundGoal(
-            Meaning.JOINTS, (*values, 0.0, 0.0), file, slots, NO_SLOTS,
+            Meaning.JOINTS, (*values, 0.0, 0.0), slots, NO_SLOTS,
             aux=self._outside(found), why=why,
         )  # fmt: skip
 
@@ -299,8 +299,12 @@ class KrlGoal(goals.GoalReader):
             f if isinstance(f, WrittenNumber) else WrittenNumber(-1.0) for f in flags
         ]
         values = [one.value for one in (*numbers, *written)]
-        file, slots = goals.locate_numbers(numbers, pose_encoding.WIDTH)
-        own = tuple(one.slot if one.file == file else -1 for one in written)
+        slots, file_of = (
+            goals.list_slots(numbers, pose_encoding.WIDTH),
+            self.task.file_of,
+        )
+        file = file_of(slots[0])
+        own = tuple(one.slot if file_of(one.slot) == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
         if self._by_joints and pose_encoding.NOT_WRITTEN in values[6:]:
             return self.unknown(NO_STATUS)
@@ -308,8 +312,7 @@ class KrlGoal(goals.GoalReader):
             return self.unknown(why)
         why = why or (NO_REASON if file >= 0 else goals.COMPUTED)
         return FoundGoal(
-            Meaning.POSE, tuple(values), file, (*slots[:6], *own), NO_SLOTS, aux=aux,
-            why=why,
+            Meaning.POSE, tuple(values), (*slots[:6], *own), NO_SLOTS, aux=aux, why=why
         )  # fmt: skip
 
     def _partial(
@@ -348,12 +351,14 @@ class KrlGoal(goals.GoalReader):
             for axis, value in enumerate(values, start=1)
         )
 
-    def _stay(self, name: str) -> FoundGoal:
+    def _stay(self, operand: ir.DataObject) -> FoundGoal:
         """Read a move to where the arm is: a step of nothing.
 
-        On an arc or in a spline block that is where the arc or the block begins.
+        On an arc or in a spline block that is where the arc or the block begins. What
+        data were given is where the arm was then.
         """
-        if self.in_block or self.move.via is not None:
+        name, given = operand.name, operand is not self.move.to
+        if given or self.in_block or self.move.via is not None:
             return self.unknown(no_target(goals.RUN_TIME), name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
         why = no_target("it stays where it is")
@@ -396,20 +401,20 @@ class KrlGoal(goals.GoalReader):
                 pins=base.pins or f"{base.name} is shifted without S and T",
                 holds=base.holds | own,
             )  # fmt: skip
-        by, file, slots = self._shift(base, other, shift, behind)
+        by, slots = self._shift(base, other, shift, behind)
         base = replace(base, stays=base.stays or base.slots[0] < 0)
         aux = self._outside_of(base, other) if behind else base.aux
         turned = f"{base.name} is turned too"
         return self.apply_shift(
-            base, goals.ReadShift(by, file, slots, own, aux, shifts, turned)
+            base, goals.ReadShift(by, slots, own, aux, shifts, turned)
         )
 
-    def _find_own_shift(self, other: ir.Operand) -> frozenset[tuple[int, int]]:
+    def _find_own_shift(self, other: ir.Operand) -> frozenset[int]:
         """Return where the numbers of a shift begin that stand in the move itself."""
         value = self.task.value(other, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
-        file, slots = goals.locate_numbers(numbers or (), pose_encoding.WIDTH)
-        return frozenset([(file, slots[0])] if file == self.here.file else [])
+        first = goals.list_slots(numbers or (), pose_encoding.WIDTH)[0]
+        return frozenset([first] if self.task.file_of(first) == self.here.file else [])
 
     def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
@@ -426,7 +431,7 @@ class KrlGoal(goals.GoalReader):
 
     def _shift(
         self, base: FoundGoal, other: ir.Operand, frame: KrlFrame, behind: bool
-    ) -> tuple[Shift, int, tuple[int, ...]]:
+    ) -> tuple[Shift, tuple[int, ...]]:
         """Say how a point is shifted, and where the numbers of that stand.
 
         Those of data may serve other moves and sums too: they stay.
@@ -438,9 +443,9 @@ class KrlGoal(goals.GoalReader):
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = numbers if isinstance(other, said.KrlAggregate) else None
-        file, slots = goals.locate_numbers(written or (), pose_encoding.WIDTH)
-        own = file == self.here.file
-        return shift, file, slots if own else (-1,) * pose_encoding.WIDTH
+        slots = goals.list_slots(written or (), pose_encoding.WIDTH)
+        files = {self.task.file_of(one.slot) for one in written or ()}
+        return shift, slots if files == {self.here.file} else NO_SLOTS
 
     # Steps.
 

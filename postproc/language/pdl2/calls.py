@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At
 from postproc.language.analysis.origins import NOWHERE
+from postproc.language.analysis.values import WrittenNumber
 from postproc.language.language import Record
 from postproc.language.pdl2 import external_routines, side_effects
 from postproc.language.pdl2 import syntax as ast
@@ -37,7 +39,6 @@ from postproc.language.pdl2.values import (
     Component,
     Nothing,
     Position,
-    SourceNumber,
     Value,
     points_of,
 )
@@ -383,10 +384,9 @@ def _frame_part(
     held = here.store.settings.get(name)
     if not isinstance(held, Position):
         held = Position()
-    number = value if isinstance(value, float) else None
-    new: Value = replace(
-        held.with_component(at, SourceNumber(number)), taught=held.taught or taught
-    )
+    number = WrittenNumber(value if isinstance(value, float) else math.nan)
+    taught = held.taught or taught
+    new: Value = replace(held.with_component(at, number), taught=taught)
     if any(held.numbers) and held.numbers in here.world.start.records:
         new = Nothing(f"a part of ${name.upper()}, which the cell gives, is assigned")
     if f"${name}" in here.volatile:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import Context
+from postproc.language.analysis.values import WrittenNumber
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.values import (
@@ -19,7 +20,6 @@ from postproc.language.pdl2.values import (
     Location,
     Nothing,
     Position,
-    SourceNumber,
     Value,
     Vector,
     add_unknown,
@@ -252,36 +252,42 @@ class Execution:
 
     def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
         parts = [self.read_number(item) for item in items]
+        values = (part.value for part in parts)
         return Position(
-            numbers=tuple(part.number for part in parts),
+            numbers=tuple(None if value != value else value for value in values),
             slots=tuple(part.slot for part in parts),
             along=frozenset(at for at, part in enumerate(parts) if part.along),
         )
 
-    def read_number(self, expression: ir.Operand | None) -> SourceNumber:
+    def read_number(self, expression: ir.Operand | None) -> WrittenNumber:
         """Return a number, and where in the text it is written or comes from."""
         match expression:
             case ir.Num(slot):
                 lines = self.place.program.lines
                 base = self.world.slot_base[lines.source.name]
                 at = int(base + lines.first[self.row] + slot)
-                return SourceNumber(self.real(expression), at)
+                return self._with_slot(expression, at)
             case ir.Operation("()", (operand,)):
                 return self.read_number(operand)
             case ir.DataObject():
-                return self._part(expression) or SourceNumber(self.real(expression))
+                return self._part(expression) or self._with_slot(expression)
             case ir.Operation("+" | "-" as sign, (ir.DataObject() as left, right)):
                 part = self._part(left)
                 if part is not None:
-                    by = self.real(right)
-                    if part.number is None or by is None or abs(by) > FARTHEST:
-                        return replace(part, number=None)
+                    by = self._with_slot(right).value
+                    by = math.nan if abs(by) > FARTHEST else by
                     return replace(
-                        part, number=part.number + (by if sign == "+" else -by)
+                        part, value=part.value + (by if sign == "+" else -by)
                     )
-        return SourceNumber(self.real(expression))
+        return self._with_slot(expression)
 
-    def _part(self, reference: ir.DataObject) -> SourceNumber | None:
+    def _with_slot(
+        self, expression: ir.Operand | None, slot: int = -1
+    ) -> WrittenNumber:
+        value = self.real(expression)
+        return WrittenNumber(math.nan if value is None else value, slot)
+
+    def _part(self, reference: ir.DataObject) -> WrittenNumber | None:
         """Return a component that stands in the text, None for anything else."""
         if reference.name.startswith("$"):
             return None
@@ -292,7 +298,7 @@ class Execution:
         held = self.store.read(target.key)
         if not isinstance(held, Position) or held.slots[at] < 0:
             return None
-        return SourceNumber(held.numbers[at], held.slots[at], along=True)
+        return replace(held.number(at), along=True)
 
     def real(self, expression: ir.Operand | None) -> float | None:
         """Return a real number, None where it is not known."""

@@ -14,6 +14,7 @@ from postproc.language.analysis.functions import (
     apply_function,
     apply_operator,
 )
+from postproc.language.analysis.values import WrittenNumber
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 Numbers = tuple[float | None, ...]
@@ -71,21 +72,6 @@ class Vector:
 
 
 @dataclass(frozen=True, slots=True)
-class SourceNumber:
-    """A number and where it stands.
-
-    Attributes:
-        number: Its value, None where unknown.
-        slot: Global index of the number in the text, -1 for none.
-        along: It is that number plus a constant.
-    """
-
-    number: float | None
-    slot: int = -1
-    along: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Position:
     """A POSITION, XTNDPOS or JOINTPOS.
 
@@ -124,10 +110,17 @@ class Position:
         """Tell whether every number stands in a text by itself."""
         return not (self.derived or self.along) and -1 not in self.slots
 
-    def with_component(self, at: int, new: SourceNumber) -> Position:
+    def number(self, at: int) -> WrittenNumber:
+        """Return a component."""
+        value = self.numbers[at]
+        known = math.nan if value is None else value
+        return WrittenNumber(known, self.slots[at], at in self.along)
+
+    def with_component(self, at: int, new: WrittenNumber) -> Position:
         """Return a copy with one component replaced."""
         numbers, slots = list(self.numbers), list(self.slots)
-        numbers[at], slots[at] = new.number, new.slot
+        numbers[at] = None if math.isnan(new.value) else new.value
+        slots[at] = new.slot
         along = self.along | {at} if new.along else self.along - {at}
         return replace(self, numbers=tuple(numbers), slots=tuple(slots), along=along)
 
@@ -183,16 +176,12 @@ def join_components(a: Value, b: Value) -> Value:
         return join(a, b)
     if (a.joints, a.config) != (b.joints, b.config):
         return join(a, b)
-    other = {at for at in range(6) if _component(a, at) != _component(b, at)}
+    other = {at for at in range(6) if a.number(at) != b.number(at)}
     if all(at in other or a.numbers[at] is None for at in range(6)):
         return join(a, b)
     for at in other:
-        a = a.with_component(at, SourceNumber(None))
+        a = a.with_component(at, WrittenNumber(math.nan))
     return _mix(a, b)
-
-
-def _component(position: Position, at: int) -> tuple[float | None, int, bool]:
-    return position.numbers[at], position.slots[at], at in position.along
 
 
 def _mix(a: Position, b: Position) -> Position:

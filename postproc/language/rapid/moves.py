@@ -18,7 +18,6 @@ from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_visits import (
     FoundGoal,
     FoundVisit,
-    explain_disagreement,
     not_reached,
 )
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
@@ -108,17 +107,6 @@ class RapidVisit(FoundVisit):
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
-    def meet(self, other: RapidVisit) -> None:
-        """Forget tool, work object, zone, speed or load."""
-        why = explain_disagreement(Code.FRAME_UNKNOWN, self.taken)
-        for name, lost in (
-            ("tool", FrameOfMove((), True, why)), ("wobj", FrameOfMove((), False, why)),
-            ("zone_mm", UNKNOWN_ZONE), ("speed", np.nan), ("total", ()),
-        ):  # fmt: skip
-            mine, new = getattr(self, name), getattr(other, name)
-            if mine != new and (mine == mine or new == new):  # NaN is NaN
-                setattr(self, name, lost)
-
 
 @dataclass
 class Goals:
@@ -137,26 +125,22 @@ class Goals:
         """Read the visits of a move: the point of an arc, and its end."""
         signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
-        start, watched = scope, points.watch()
-        if points.routines:
-            start = replace(scope, points=points)
-        there = start if watched is points else replace(scope, points=watched)
+        there = replace(scope, points=points) if points.routines else scope
         tool, wobj, zone, speed = self._conditions(one, ends, there)
         motion = _motion(one.name, signature)
-        reader = RapidGoal(self.task, start, signature.joints, self._slots)
+        reader = RapidGoal(self.task, there, signature.joints, self._slots)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         total, untold = self._total(one, there)
         why = why or untold
         for via in (True, False) if signature.via >= 0 else (False,):
-            goal = reader.end(ends[via])
+            goal = reader.goal(ends[via])
             if not (via or signature.reaches):
                 goal = not_reached(goal, why)
             yield RapidVisit(
                 scope, motion, via, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
-                taken=watched.given,
             )  # fmt: skip
 
     def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
@@ -281,10 +265,10 @@ class RapidGoal(goals.GoalReader):
         if own != parts or tuple(map(len, own)) != counts:
             return None
         numbers = [one for part in own[:-1] for one in part]
-        file, slots = goals.locate_numbers(numbers, WIDTH)
+        slots = goals.list_slots(numbers, WIDTH)
         goal = self._goal_of([x.value for x in numbers], [x.value for x in own[-1]])
-        why = goal.why or (NO_REASON if file >= 0 else goals.COMPUTED)
-        return replace(goal, file=file, slots=slots, why=why)
+        why = goal.why or (NO_REASON if slots[0] >= 0 else goals.COMPUTED)
+        return replace(goal, slots=slots, why=why)
 
     def _goal_of(self, numbers: list[float], outside: list[float]) -> FoundGoal:
         """Return where numbers and external axes lead."""
@@ -326,7 +310,9 @@ class RapidGoal(goals.GoalReader):
         found = self._goal_of(values[:count], values[count:])
         if not np.isfinite(values).all() or found.why:
             return None
-        return replace(found, file=file, slots=(*at[:count], *(-1,) * (WIDTH - count)))
+        begin = self.task.first_slots[file]
+        own = [begin + slot for slot in at[:count]]
+        return replace(found, slots=(*own, *(-1,) * (WIDTH - count)))
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read Offs and RelTool: the point is moved along."""
@@ -343,8 +329,9 @@ class RapidGoal(goals.GoalReader):
         base = replace(self, joints=False).goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
         first = int(self.task.files[self.here.file].text.first[self.here.row])
+        first += self.task.first_slots[self.here.file]
         slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
-        own = frozenset([(self.here.file, slots[0])] if slots[0] >= 0 else [])
+        own = frozenset(slots[:1] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
         if base.target != Meaning.POSE or np.isnan(by).any():
             return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
@@ -354,7 +341,7 @@ class RapidGoal(goals.GoalReader):
         if not all(isinstance(one, ir.Num) for one in given):
             slots = [-1] * len(slots)
         return self.apply_shift(base, goals.ReadShift(
-            shift, self.here.file, (*slots, *(-1,) * (WIDTH - len(slots))), own,
+            shift, (*slots, *(-1,) * (WIDTH - len(slots))), own,
             shifts=shifts, turned=turned,
         ))  # fmt: skip
 
@@ -376,7 +363,7 @@ class RapidGoal(goals.GoalReader):
             text = f"has an element or value that is not known: {goals.RUN_TIME}"
         return Reason(code, f"{name} {text}")
 
-    def explain_pinned(self, name: str, file: int) -> str:
+    def explain_pinned(self, name: str, slot: int) -> str:
         """Say why a point must keep its numbers."""
         if name in self.task.twins:
             return (

@@ -135,8 +135,9 @@ class RapidTask(TaskSymbols[RapidFile]):
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
             return False
-        text, lines = self.files[one.file].text, self.taught_lines[one.file]
-        return not lines.isdisjoint(text.lines(text.row_of(one.slot)))
+        text = self.files[file := self.file_of(one.slot)].text
+        row = text.row_of(one.slot - self.first_slots[file])
+        return not self.taught_lines[file].isdisjoint(text.lines(row))
 
     # What other tasks do: global persistents of one name are the same data.
 

@@ -24,7 +24,7 @@ def point(name, index=(), row=0):
 
 def test_an_element_is_forgotten_alone_or_with_its_array():
     held = NO_POINTS.give(point("s", (1,))).give(point("s", (2,))).give(point("q"))
-    assert held.find(point("s", (2,)).key) == point("s", (2,))
+    assert held.held.get(point("s", (2,)).key) == point("s", (2,))
     assert [*held.forget((0, "m", "", "s")).held] == [point("q").key]
     assert held.leave((0, "m", "main")) is held
 
@@ -44,16 +44,6 @@ def test_a_component_is_set_again_and_others_stay():
         ("x", 2.0, 4), ("z", None, 5),
     ]  # fmt: skip
     assert held.names == {"h", "k"}
-
-
-def test_who_asks_knows_what_the_answer_depends_on():
-    held = NO_POINTS.give(point("q")).give(point("r"))
-    outer = held.watch()
-    inner = outer.watch()
-    inner.find(point("q").key)
-    outer.find(point("r").key)
-    assert {one.name for one in inner.given} == {"q"}
-    assert {one.name for one in outer.given} == {"q", "r"}
 
 
 def test_as_many_points_as_a_program_assigns_are_known():

@@ -439,6 +439,26 @@ def test_where_the_arm_is_holds_no_target():
     assert goals == [known, known, lost, known, lost]
 
 
+def test_where_the_arm_was_is_not_where_it_is():
+    """A point keeps the place where the arm was when it was given that place."""
+    found = job("LIN XP1", "Q=$POS_ACT", "LIN XP2", "LIN Q", data=f"{DATA}DECL POS Q")
+    meanings = [Meaning.POSE, Meaning.POSE, Meaning.UNKNOWN]
+    assert found.visits.target.meaning.tolist() == meanings
+    assert "known only when the program runs" in reasons(found)[2]
+
+
+@pytest.mark.parametrize("name", ["I", "K"])
+def test_an_element_by_reference_is_the_one_that_the_call_decides(name):
+    """Its index may be changed before the routine moves to it."""
+    data = f"{DATA}DECL POS ARR[2]\nDECL INT I\nDECL INT K\n"
+    data += "".join(f"ARR[{k}]={{X {k},Y 0,Z 0,A 0,B 0,C 0}}\n" for k in (1, 2))
+    more = f"DEF GO(P:OUT)\nDECL POS P\n{name}=2\nLIN P\nEND\n"
+    target = job("I=1", "GO(ARR[I])", more=more, data=data).visits.target
+    known = name != "I"
+    assert target.meaning.tolist() == [Meaning.POSE if known else Meaning.UNKNOWN]
+    assert not known or target.values[0, 0] == 1.0
+
+
 def test_home_holds_no_target():
     v = job("PTP XHOME", "PTP HOME").visits
     assert v.target.meaning.tolist() == [Meaning.HOME] * 2

@@ -245,3 +245,28 @@ def test_numbers_that_instructions_and_functions_answer_in(kind):
     assert reasons(once(*lines, more=more)) == [""]
     found = once(ANSWERS[kind], *lines, more=more)
     assert "displacement" in reasons(found)[0]
+
+
+ELEMENTS = "VAR num i;\nVAR robtarget g;\nVAR robtarget list2{2};\n"
+
+
+@pytest.mark.parametrize(
+    ("change", "known"), [("i:=2;", False), ("other;", False), ("n:=2;", True)]
+)
+def test_an_element_is_the_one_that_the_call_decides(change, known):
+    """A reference stands for an element whatever its index is told by later."""
+    more = routine("go", change, L.format("r"), given="(INOUT robtarget r)")
+    more += routine("other", "i:=2;") + "VAR num n;\n"
+    lines = ["list2{1}:=p1;", "list2{2}:=p2;", "i:=1;", "go list2{i};"]
+    found = once(*lines, L.format("p2"), more=ELEMENTS + more)
+    target = found.visits.target
+    assert target.meaning[0] == (Meaning.POSE if known else Meaning.UNKNOWN)
+    assert not known or target.values[0, 0] == 1.0
+    assert bool(found.visits.literals.pinned[-1]) is not known
+
+
+def test_what_a_function_returned_is_what_it_was_at_the_call():
+    more = routine("go", "g:=p2;", L.format("r"), given="(robtarget r)")
+    more += "FUNC robtarget f()\nRETURN g;\nENDFUNC\n"
+    found = once("g:=p1;", "go f();", more=ELEMENTS + more)
+    assert found.visits.target.values[0, 0] == 1.0
