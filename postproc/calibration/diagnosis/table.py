@@ -403,7 +403,7 @@ class Table:
         axes = JointAxes.of(view.fit, carrier.move(view.at))
         along = View(axes.size, axes.along(view.squares), axes.along(rows))
         for factor in _factors(carrier):
-            laws, each = self._tried(carrier, factor), []
+            laws, each = self._laws_on(carrier, factor), []
             for some, values, _ in laws.widths:
                 reduced = reduce_columns(along, (), axes.size.apply(values))
                 evidence = log_evidence(reduced, square, view.rows)
@@ -412,7 +412,7 @@ class Table:
             if each:
                 yield factor, laws, tuple(each)
 
-    def _tried(self, carrier: Carrier, factor: str) -> MotionLaws:
+    def _laws_on(self, carrier: Carrier, factor: str) -> MotionLaws:
         """Return the laws of a factor that are tried on a carrier."""
         if self.only is None:
             return self.laws.get(factor, NO_LAWS)
