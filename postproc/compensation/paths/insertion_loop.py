@@ -44,6 +44,7 @@ from postproc.compensation.paths.arc_splitting import (
     whole_arcs,
 )
 from postproc.compensation.paths.arcs import point_on_way
+from postproc.compensation.paths.backlash_preload import LATEST, TAKEN
 from postproc.compensation.paths.best_points import BestPoints
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import (
@@ -61,8 +62,6 @@ from postproc.compensation.timing_comparison import run_in_time
 from postproc.language.languages import language_of
 
 ROUNDS = 16  # of points put on the ways
-TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
-LATEST = 0.9  # of a way: the last place of it for a stop
 
 
 Rule = Callable[[PathPrediction], InsertionPlan]

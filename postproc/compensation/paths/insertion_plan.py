@@ -119,6 +119,13 @@ class InsertionPlan:
             plan = plan.drop(v, {plan.points[v][0]})
         return plan
 
+    def move_stops(self, places: Mapping[int, float]) -> InsertionPlan:
+        """Put the stops of lines elsewhere, at shares of their ways."""
+        plan = self
+        for v, share in places.items():
+            plan = plan.put(v, (share, *self.points[v][1:]))
+        return plan
+
     def as_in(self, other: InsertionPlan, v: int) -> InsertionPlan:
         """Put on the way of a move what another plan puts there."""
         own = {cut for cut in other.chords if cut[0] == v}

@@ -16,7 +16,7 @@ import pytest
 from postproc.arrays import Floats
 from postproc.compensation.paths import insertion_loop, prune, split_selection
 from postproc.compensation.paths.arcs import is_arc
-from postproc.compensation.paths.insertion_loop import TAKEN
+from postproc.compensation.paths.backlash_preload import TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
 from postproc.compensation.paths.plan_outcomes import BEGINS
