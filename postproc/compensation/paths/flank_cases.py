@@ -15,7 +15,7 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Ints, any_in_rows
 from postproc.compensation.paths.path_states import CHANGED, AlongWays, ErrorAlong
 from postproc.model.flank_hypotheses import (
     ANOTHER,
@@ -171,6 +171,19 @@ class FlankCases:
     def predict(self, rows: Ints, side: Floats) -> Floats:
         """Predict the error at samples (k,) with joints on other sides, (k, 3) [m]."""
         return self.error(self.run, rows, side)
+
+    def off_with(self, side: Floats) -> Floats:
+        """Return from the paths to the TCP with sharp joints on other sides, (s, 3).
+
+        Args:
+            side: Of all joints, (s, 6).
+        """
+        usual, sharp = self.run.side, nominal_widths(self._flanks) == 1.0
+        there = np.where(sharp, side, usual)
+        rows = np.flatnonzero(any_in_rows(np.abs(there - usual) > CHANGED))
+        off = np.array(self.off)
+        off[rows] += self.predict(rows, there[rows]) - self.predict(rows, usual[rows])
+        return off
 
     def spread(self, rows: Ints) -> Floats:
         """Return the covariance of what no effect describes, see `ErrorAlong`."""

@@ -30,6 +30,7 @@ class InsertionPlan:
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
         tried: How far a move with a stop began off, and where it stopped, try by try.
         shut: Where no points may lie any more: corrections changed too fast there.
+        settled: Moves that more points do not help.
         crowded: More points were wanted than there was room for.
         left: Why moves that leave their path too far are not split.
         cures: What would help those among them that something else hinders than room.
@@ -45,6 +46,7 @@ class InsertionPlan:
     approaches: Mapping[int, Floats] = field(default_factory=dict)
     tried: Mapping[int, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     shut: Mapping[int, frozenset[float]] = field(default_factory=dict)
+    settled: frozenset[int] = frozenset()
     crowded: bool = False
     left: Mapping[int, str] = field(default_factory=dict)
     cures: Mapping[int, str] = field(default_factory=dict)
