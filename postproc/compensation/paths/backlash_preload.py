@@ -21,6 +21,8 @@ from postproc.model.flank_hypotheses import flanks_of, nominal_widths
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.pose import rotation_vector
 
+TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
+LATEST = 0.9  # of a way: the last place of it for a stop
 WHOLE = 0.999  # of half the play: a drive that lies there has crossed
 LEAVING = 5e-3  # [m] behind which a move is under way
 LEAST = 1e-9  # of half the play: less is no way of a drive

@@ -13,6 +13,7 @@ from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
 
 BETTER = 1e-6  # [m] less is no matter
+IN_VAIN = 5  # rounds of more points that make a move no better: it gets no more
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,11 @@ class _Tried:
     stops: frozenset[int]
     chords: frozenset[Cut]
 
+    @property
+    def count(self) -> int:
+        """Return the number of points."""
+        return sum(map(len, self.points.values()))
+
 
 @dataclass(frozen=True)
 class BestPoints:
@@ -42,20 +48,32 @@ class BestPoints:
     Attributes:
         best: What did best, by the first visit of each move.
         refused: Why points of moves could not be corrected, what was said first.
+        vain: In how many rounds more points made a move no better, and how many it had.
     """
 
     best: Mapping[int, _Tried] = field(default_factory=dict)
     refused: Mapping[int, str] = field(default_factory=dict)
+    vain: Mapping[int, tuple[int, int]] = field(default_factory=dict)
 
     def note(self, now: PathPrediction) -> BestPoints:
         """Look at how the moves do with the points that they have now."""
-        best, bad = dict(self.best), _unfit(now)
+        best, vain, bad = dict(self.best), dict(self.vain), _unfit(now)
         for v, tried in _list_tried(now).items():
             known = best.setdefault(v, tried)
+            rounds, most = vain.get(v, (0, 0))
+            helps = tried.size < known.size - BETTER
+            more = tried.count > most
+            vain[v] = 0 if helps else rounds + more, max(most, tried.count)
             if v not in bad and tried.size <= known.size + BETTER:  # the later one
                 farther = tried.size > known.size
                 best[v] = replace(tried, size=known.size) if farther else tried
-        return BestPoints(best, {**now.refusals, **self.refused})
+        return BestPoints(best, {**now.refusals, **self.refused}, vain)
+
+    def settle(self, now: PathPrediction) -> PathPrediction:
+        """Let moves that more points do not help get no more."""
+        over = {v for v, (rounds, _) in self.vain.items() if rounds >= IN_VAIN}
+        rows = frozenset(row for v in over for row in halves(now.task.visits, v))
+        return replace(now, plan=replace(now.plan, settled=rows))
 
     def restore(self, now: PathPrediction) -> InsertionPlan:
         """Give moves back the points that did better than those they have."""

@@ -17,6 +17,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.options import Job
 from postproc.compensation.outcome import Decisions, Status
+from postproc.compensation.paths.backlash_preload import cross_at_once
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.pipeline import WindowResult
@@ -72,6 +73,18 @@ class Part:
     def paths(self) -> PathAccuracy:
         """Return how far they leave their paths."""
         return self.in_time.paths
+
+    @cached_property
+    def off_at_points(self) -> Floats:
+        """How far points at samples of paths are to move these, reversed, (s, 3) [m].
+
+        That is where the TCP is if drives cross their gaps where they begin to, as
+        points let them.
+        """
+        cases = self.paths.cases
+        if cases is None:
+            return self.paths.after.off
+        return cases.off_with(cross_at_once(cases.run.side, cases.first))
 
     @cached_property
     def steep(self) -> Bools:

@@ -7,6 +7,7 @@ sides times what the TCP moves as that joint goes from the middle to its upper f
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +15,7 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Ints, any_in_rows
 from postproc.compensation.paths.path_states import CHANGED, AlongWays, ErrorAlong
 from postproc.model.flank_hypotheses import (
     ANOTHER,
@@ -39,7 +40,13 @@ _TOGETHER = FlankKind.PUSHED, FlankKind.RAN_ON
 """Hypotheses that have one cause in all joints, and are tried for all together too."""
 
 Key = tuple[int, FlankKind, int]
-"""A joint (from 1), what it does, and which of its cases of that kind it is."""
+"""A joint (from 1), what it does, and which of its cases of that kind it is.
+
+The same case has the same key in all predictions, whichever cases make a difference.
+"""
+
+TOGETHER = -1
+"""Number of the case of all joints, in the key of the first of these."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +54,14 @@ class FlankCase:
     """What one hypothesis of one joint makes of the paths.
 
     Attributes:
-        joint: 1 to 6.
-        kind: What the joint does.
+        key: Which it is.
         weight: Of the hypothesis; 1 where a flank is not known.
         rows: The samples at which it makes a difference, (k,), ascending.
         across: Distance from the path there, (k,) [m].
         by: From where the TCP is predicted there to where it is, (k, 3) [m].
     """
 
-    joint: int
-    kind: FlankKind
+    key: Key
     weight: float
     rows: Ints
     across: Floats
@@ -97,10 +102,13 @@ class FlankCases:
             every = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
             moves = np.empty((len(self.off), 3))
             moves[every] = self._moves_of(joint, every)
+            number = Counter[FlankKind]()
             for (kind, weight, own), at in zip(sides, rows, strict=True):
+                key = joint + 1, kind, number[kind]
+                number[kind] += 1
                 by = (own[at] - usual[at])[:, None] * moves[at]
                 if len(at):
-                    found.append(self._case(joint + 1, kind, weight, at, by))
+                    found.append(self._case(key, weight, at, by))
                 if kind in together:
                     together[kind][at] += by
         all_of = (self._all_of(kind, by) for kind, by in together.items())
@@ -118,20 +126,18 @@ class FlankCases:
             by = error(self.run, every, side) - usual
             at = np.flatnonzero(lengths(by) > MOVED)
             if len(at):
-                yield self._case(joint, kind, WEIGHS_OTHER, at, by[at])
+                yield self._case((joint, kind, 0), WEIGHS_OTHER, at, by[at])
 
     def open_sides(self) -> OpenSides:
         """Return the sides of joints by open hypotheses; they take some memory."""
         return OpenSides(self.run, self.error, self._flanks, self.way, self.first)
 
-    def _case(
-        self, joint: int, kind: FlankKind, weight: float, at: Ints, by: Floats
-    ) -> FlankCase:
+    def _case(self, key: Key, weight: float, at: Ints, by: Floats) -> FlankCase:
         """Move the TCP by some way (k, 3) at samples (k,)."""
         there = self.off[at] + by
         along = np.einsum("si,si->s", there, self.tangent[at])
         across = lengths(there - along[:, None] * self.tangent[at])
-        return FlankCase(joint, kind, weight, at, across, by)
+        return FlankCase(key, weight, at, across, by)
 
     def _all_of(self, kind: FlankKind, by: Floats) -> Iterator[FlankCase]:
         """Yield the case of all links that run on at stops; they have one cause.
@@ -146,17 +152,12 @@ class FlankCases:
         at = np.flatnonzero(by.any(axis=1))
         if len(open_) > 1 and len(at):
             weight = max(self._flanks[j - 1].weight[kind] for j in open_)
-            yield self._case(open_[0], kind, weight, at, by[at])
+            yield self._case((open_[0], kind, TOGETHER), weight, at, by[at])
 
     @property
     def by_key(self) -> dict[Key, FlankCase]:
-        """Return the cases by joint, kind, and number of that kind."""
-        return dict(zip(self._keys, self.cases, strict=True))
-
-    @cached_property
-    def _keys(self) -> tuple[Key, ...]:
-        kinds = [(case.joint, case.kind) for case in self.cases]
-        return tuple((*kind, kinds[:k].count(kind)) for k, kind in enumerate(kinds))
+        """Return the cases by their keys."""
+        return {case.key: case for case in self.cases}
 
     @property
     def usually(self) -> Floats:
@@ -170,6 +171,19 @@ class FlankCases:
     def predict(self, rows: Ints, side: Floats) -> Floats:
         """Predict the error at samples (k,) with joints on other sides, (k, 3) [m]."""
         return self.error(self.run, rows, side)
+
+    def off_with(self, side: Floats) -> Floats:
+        """Return from the paths to the TCP with sharp joints on other sides, (s, 3).
+
+        Args:
+            side: Of all joints, (s, 6).
+        """
+        usual, sharp = self.run.side, nominal_widths(self._flanks) == 1.0
+        there = np.where(sharp, side, usual)
+        rows = np.flatnonzero(any_in_rows(np.abs(there - usual) > CHANGED))
+        off = np.array(self.off)
+        off[rows] += self.predict(rows, there[rows]) - self.predict(rows, usual[rows])
+        return off
 
     def spread(self, rows: Ints) -> Floats:
         """Return the covariance of what no effect describes, see `ErrorAlong`."""

@@ -29,12 +29,13 @@ is told of it `insertion_summary.py`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.compensation.options import Job
 from postproc.compensation.paths.arc_splitting import (
     cut_at_vias,
@@ -44,6 +45,7 @@ from postproc.compensation.paths.arc_splitting import (
     whole_arcs,
 )
 from postproc.compensation.paths.arcs import point_on_way
+from postproc.compensation.paths.backlash_preload import LATEST, TAKEN
 from postproc.compensation.paths.best_points import BestPoints
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import (
@@ -52,6 +54,7 @@ from postproc.compensation.paths.insertion_prediction import (
     Write,
 )
 from postproc.compensation.paths.insertion_summary import summarize
+from postproc.compensation.paths.path_error import apart
 from postproc.compensation.paths.prune import judge
 from postproc.compensation.paths.reapproach import insert_reapproaches
 from postproc.compensation.paths.split_selection import find_split
@@ -60,9 +63,8 @@ from postproc.compensation.program import ParsedProgram
 from postproc.compensation.timing_comparison import run_in_time
 from postproc.language.languages import language_of
 
+FORETOLD = 4  # points in a part of a path before it is predicted with them
 ROUNDS = 16  # of points put on the ways
-TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
-LATEST = 0.9  # of a way: the last place of it for a stop
 
 
 Rule = Callable[[PathPrediction], InsertionPlan]
@@ -119,7 +121,7 @@ def _repeat(
         plan = repair(now)
         if plan.written == now.plan.written:
             best = best.note(now)
-            plan = rule(now)
+            plan = rule(best.settle(now))
             if plan.written == now.plan.written:
                 return replace(now, plan=plan), best
         now = now.task.predict(plan)
@@ -164,7 +166,9 @@ def _put_on_paths(now: PathPrediction) -> InsertionPlan:
     for v in now.worst_first:
         if plan.crowded and room <= 0:
             break
-        if v not in plan.open or now.sizes[v] <= now.task.aim:
+        if now.sizes[v] <= now.task.aim:
+            break
+        if v not in plan.open or v in plan.settled:
             continue
         via = v in whole  # the point on the way of an arc becomes one, too
         more = _put_on_path(now, plan, v, room - via)
@@ -236,11 +240,62 @@ def _on_path(now: PathPrediction, v: int) -> list[float]:
 
 
 def _seek_on_path(now: PathPrediction, v: int) -> list[float]:
-    """Find a point in every part of a path that is left too far, the worst first."""
-    plan, (paths, k) = now.plan, now.path_to(v)
+    """Find points in the parts of a path that are left too far, the worst first.
+
+    Where the path is with them is foretold: it goes evenly from where one point moves
+    it to the next one. In what is still too far off come the next points. Where it is
+    open how flanks change nothing is foretold: the fewer points, the less they risk.
+    """
+    part, (paths, k) = now.part_of(v), now.path_to(v)
     samples = paths.samples(k)
-    way, far = paths.way[samples], paths.after.across[samples]
-    known, shut = plan.points.get(v, ()), plan.shut.get(v, ())
+    way, tangent = paths.way[samples], paths.tangent[samples]
+    off, far = part.off_at_points[samples], paths.after.across[samples]
+    found: list[float] = []
+    for _ in range(1 if v in now.task.open_moves else FORETOLD):
+        if not (new := _seek_in_parts(now, v, found, way, far)):
+            break
+        found += new
+        known = [0.0, *now.plan.points.get(v, ()), 1.0]
+        far, _ = apart(off - _move_between(way, off, known, found), tangent)
+    return found
+
+
+def _move_between(
+    way: Floats, off: Floats, known: Sequence[float], new: Sequence[float]
+) -> Floats:
+    """Say by what new points move a path, (s, 3) [m].
+
+    Args:
+        way: Path length at its samples, (s,) [m].
+        off: What points there are to move it by, (s, 3) [m].
+        known: The points that it has, and its ends, shares of its way.
+        new: .. and the new ones.
+    """
+    places = np.array([*known, *new]) * way[-1]
+    by = np.zeros((len(places), 3))
+    at = np.searchsorted(way, places[len(known) :])
+    by[len(known) :] = off[at.clip(0, len(way) - 1)]
+    order = np.argsort(places)
+    columns = by[order].T
+    moved = [np.interp(way, places[order], column) for column in columns]
+    return np.stack(moved, axis=1)
+
+
+def _seek_in_parts(
+    now: PathPrediction, v: int, more: Sequence[float], way: Floats, far: Floats
+) -> list[float]:
+    """Find a point in every part of a path that is left too far, the worst first.
+
+    Args:
+        now: The program.
+        v: The visit that the path leads to.
+        more: Points that it is to have beside its own.
+        way: Path length at its samples, (s,) [m].
+        far: How far it is left there, (s,) [m].
+    """
+    plan = now.plan
+    known = sorted([*plan.points.get(v, ()), *more])
+    shut = plan.shut.get(v, ())
     least, clear, behind = plan.open[v]
     ends = [0.0, *(share * way[-1] for share in known), float(way[-1])]
     found = []

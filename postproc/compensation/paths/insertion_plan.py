@@ -30,6 +30,7 @@ class InsertionPlan:
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
         tried: How far a move with a stop began off, and where it stopped, try by try.
         shut: Where no points may lie any more: corrections changed too fast there.
+        settled: Moves that more points do not help.
         crowded: More points were wanted than there was room for.
         left: Why moves that leave their path too far are not split.
         cures: What would help those among them that something else hinders than room.
@@ -45,6 +46,7 @@ class InsertionPlan:
     approaches: Mapping[int, Floats] = field(default_factory=dict)
     tried: Mapping[int, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     shut: Mapping[int, frozenset[float]] = field(default_factory=dict)
+    settled: frozenset[int] = frozenset()
     crowded: bool = False
     left: Mapping[int, str] = field(default_factory=dict)
     cures: Mapping[int, str] = field(default_factory=dict)
@@ -117,6 +119,13 @@ class InsertionPlan:
         plan = replace(self, stops=frozenset())
         for v in sorted(self.stops):
             plan = plan.drop(v, {plan.points[v][0]})
+        return plan
+
+    def move_stops(self, places: Mapping[int, float]) -> InsertionPlan:
+        """Put the stops of lines elsewhere, at shares of their ways."""
+        plan = self
+        for v, share in places.items():
+            plan = plan.put(v, (share, *self.points[v][1:]))
         return plan
 
     def as_in(self, other: InsertionPlan, v: int) -> InsertionPlan:

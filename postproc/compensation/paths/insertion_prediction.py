@@ -36,6 +36,7 @@ from postproc.compensation.paths.plan_outcomes import (
     compare,
     expect_better,
 )
+from postproc.compensation.paths.plan_rule import NEGLIGIBLE
 from postproc.compensation.paths.split_constraints import (
     hindrances,
     speeds_of_pieces,
@@ -56,8 +57,8 @@ from postproc.compensation.rewrite import Output
 from postproc.compensation.timing_comparison import InTime, run_in_time, run_visits
 from postproc.language.insert_moves import Splitter
 from postproc.language.visits import Visits
-from postproc.model.flank_hypotheses import FlankOfJoint, flanks_of
-from postproc.robot.pose import MM
+from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint, flanks_of
+from postproc.robot.pose import MM, lengths
 
 AIM = 0.4  # of the tolerance: what points are to reach
 KEPT = 4  # predictions that are kept: plans return to what was tried
@@ -124,6 +125,20 @@ class InsertionTask:
     def sides(self) -> PlanSides:
         """Return from which sides points of plans are meant to be passed."""
         return PlanSides(self.setting, self.visits, self.first, self.flanks)
+
+    @cached_property
+    def open_moves(self) -> frozenset[int]:
+        """Return the moves on the way of which flanks may change otherwise by any data.
+
+        Without points; of steps that are too small to count none.
+        """
+        paths, found = self.first.paths, set[int]()
+        for case in paths.cases.cases if paths.cases else ():
+            if case.key[1] not in (FlankKind.RAN_ON, FlankKind.START):
+                rows = case.rows[lengths(case.by) > NEGLIGIBLE * self.tolerance]
+                at = np.searchsorted(paths.first, rows, side="right") - 1
+                found.update(paths.visit[np.unique(at)].tolist())
+        return frozenset(found)
 
     @cached_property
     def windows(self) -> Windows:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from postproc.compensation.paths.arcs import halves
+from postproc.compensation.paths.backlash_preload import LATEST, TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.path_error import sizes_of
@@ -75,9 +76,9 @@ def _find_bad(
 def choose_plans(now: PathPrediction) -> InsertionPlan:
     """Choose for every move with points how much of them it gets.
 
-    See `choose_plan`: all points, those without the stop that preloads, points that
-    correct half of what flanks change by, or none. What a hypothesis speaks against
-    is thinned out later.
+    See `choose_plan`: all points, those without the stop that preloads or with a later
+    one, points that correct half of what flanks change by, or none. What a hypothesis
+    speaks against is thinned out later.
     """
     visits, chosen = now.task.visits, now.plan
     for rows, compared, plans in _try_plans(now):
@@ -97,23 +98,45 @@ def _try_plans(
 ) -> Iterator[tuple[Rows, MoveOutcomes, list[InsertionPlan]]]:
     """Yield every move with points, how it does without and by some plans, and these.
 
+    A later stop is looked at where something speaks against points with an early one.
     Half is looked at where nothing else keeps the finest promise, and it is expected to
     do better.
     """
     task, made = now.task, [now]
     if now.plan.stops:
         made.append(task.predict(now.plan.without_stops()))
-    moves = task.compare(made, _moves_with_points(now))
+    plain, moves = made[-1], task.compare(made, _moves_with_points(now))
+    if later := _stop_later(now, moves):
+        made.append(task.predict(now.plan.move_stops(later)))
+        moves |= task.compare(made, [(v,) for v in later])
     finest, halved = resolution(task.tolerance), dict[Rows, MoveOutcomes]()
     if any(flank.open_kinds for flank in task.flanks):
         rough = {rows: own for rows, own in moves.items() if own.choice[1] > finest}
-        plain, open_ = made[-1].plan, task.expect_halves(made[-1], rough)
-        own = plain.points.keys() & {v for rows in open_ for v in rows}
-        made.append(task.predict(replace(plain, halved=frozenset(own))))
+        open_ = task.expect_halves(plain, rough)
+        own = plain.plan.points.keys() & {v for rows in open_ for v in rows}
+        made.append(task.predict(replace(plain.plan, halved=frozenset(own))))
         halved = task.compare(made, open_)
     plans = [one.plan for one in made]
     for rows, compared in moves.items():
         yield rows, halved.get(rows, compared), plans
+
+
+def _stop_later(
+    now: PathPrediction, moves: Mapping[Rows, MoveOutcomes]
+) -> dict[int, float]:
+    """Find lines for which the last place of a stop may do, as shares of their ways.
+
+    Where links ran on, drives that leave on have crossed more of their gaps there.
+    """
+    found = dict[int, float]()
+    for (v, *rest), compared in moves.items():
+        if v in now.plan.stops and not rest and compared.objection(1):
+            paths, k = now.path_to(v)
+            share = TAKEN[-1] / float(paths.way[paths.samples(k)][-1])
+            room = min((*now.plan.points[v][1:], LATEST))
+            if now.plan.points[v][0] < share < room:
+                found[v] = share
+    return found
 
 
 def _moves_with_points(now: PathPrediction) -> list[Rows]:

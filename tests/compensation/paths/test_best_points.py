@@ -7,8 +7,9 @@ from unittest.mock import Mock
 
 import numpy as np
 
-from postproc.compensation.paths.best_points import BestPoints
+from postproc.compensation.paths.best_points import IN_VAIN, BestPoints
 from postproc.compensation.paths.insertion_plan import InsertionPlan
+from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.robot.trajectory import Motion
 
 OPEN = {7: (0.0, 0.0, 0.0)}
@@ -16,10 +17,12 @@ OPEN = {7: (0.0, 0.0, 0.0)}
 
 def tried(size: float, *shares: float, refused: str = "") -> Any:
     """A line with points, and how far it is off with them [m]."""
-    now = Mock(plan=InsertionPlan(open=OPEN, points={7: shares} if shares else {}))
-    now.sizes, now.flat = {7: size}, {}
-    now.refusals = {7: refused} if refused else {}
-    now.task.visits.motion.kind = np.full(9, int(Motion.LINEAR))
+    task = Mock()
+    task.visits.motion.kind = np.full(9, int(Motion.LINEAR))
+    plan = InsertionPlan(open=OPEN, points={7: shares} if shares else {})
+    now = PathPrediction(task, plan, (), np.zeros(9, dtype=np.int64))
+    refusals = {7: refused} if refused else {}
+    vars(now).update(sizes={7: size}, flat={}, refusals=refusals)
     return now
 
 
@@ -36,3 +39,21 @@ def test_points_that_cannot_be_corrected_never_come_back() -> None:
     best = BestPoints().note(tried(3e-4)).note(tried(1e-5, 0.5, refused="why"))
     plan = best.restore(tried(1e-5, 0.5, refused="why"))
     assert not plan.points and plan.left == {7: "why"}
+
+
+def test_a_move_that_more_points_do_not_help_gets_no_more() -> None:
+    best, shares = BestPoints().note(tried(3e-4)), [0.5]
+    for k in range(IN_VAIN):
+        now = tried(3e-4, *shares)
+        assert 7 not in best.settle(now).plan.settled
+        best, shares = best.note(now), [*shares, 0.6 + k / 100]
+    assert best.settle(tried(3e-4)).plan.settled == {7}
+    helped = best.note(tried(2e-4, *shares))
+    assert not helped.settle(tried(3e-4)).plan.settled
+
+
+def test_rounds_in_which_other_moves_get_points_do_not_count() -> None:
+    best = BestPoints()
+    for _ in range(3 * IN_VAIN):
+        best = best.note(tried(3e-4, 0.5))
+    assert not best.settle(tried(3e-4, 0.5)).plan.settled

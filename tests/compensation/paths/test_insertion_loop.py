@@ -16,7 +16,7 @@ import pytest
 from postproc.arrays import Floats
 from postproc.compensation.paths import insertion_loop, prune, split_selection
 from postproc.compensation.paths.arcs import is_arc
-from postproc.compensation.paths.insertion_loop import TAKEN
+from postproc.compensation.paths.backlash_preload import TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
 from postproc.compensation.paths.plan_outcomes import BEGINS
@@ -432,6 +432,33 @@ def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> 
     assert plan.points == {7: (0.2, 0.5, 0.6)} and not plan.shut  # as it was
     now.steep_pieces.return_value = []
     assert insertion_loop.drop_where_steep(now) is plan
+
+
+def test_a_path_with_points_is_foretold_to_go_evenly_between_them() -> None:
+    way = np.linspace(0.0, 1.0, 101)
+    off = np.zeros((101, 3))
+    off[:, 1] = np.where(way < 0.5, 2e-4, -1e-4)
+    moved = insertion_loop._move_between(way, off, [0.0, 0.8, 1.0], [0.4, 0.6])
+    known = np.interp(way, [0, 0.4, 0.6, 0.8, 1], [0, 2e-4, -1e-4, 0, 0])
+    assert moved[:, 1] == pytest.approx(known) and not moved[:, ::2].any()
+
+
+def test_points_on_both_flanks_are_sought_at_once() -> None:
+    """The error of a line turns around in its middle, as where a joint turns back."""
+    way = np.linspace(0.0, 0.5, 501)
+    off = np.zeros((501, 3))
+    off[:, 1] = np.where(way < 0.25, 1.0, -0.5) * 1e-3 * np.minimum(way, 0.5 - way)
+    paths = Mock(way=way, tangent=np.tile([1.0, 0.0, 0.0], (501, 1)))
+    paths.samples.return_value = slice(0, 501)
+    paths.after.across = np.abs(off[:, 1])
+    now = Mock(plan=InsertionPlan(open={7: (0.0025, 0.0025, 0.0025)}))
+    now.path_to.return_value, now.task.aim = (paths, 0), 4e-5
+    now.task.open_moves = frozenset()
+    now.part_of.return_value.off_at_points = off
+    found = insertion_loop._seek_on_path(now, 7)
+    assert found == pytest.approx([0.498, 0.504], abs=0.002)
+    now.task.open_moves = frozenset({7})
+    assert insertion_loop._seek_on_path(now, 7) == found[:1]
 
 
 def test_where_the_error_changes_fast_points_beside_it_are_taken_back(

@@ -10,7 +10,7 @@ import pytest
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.expected_error import SIDED
-from postproc.compensation.paths.flank_cases import FlankCase, FlankCases
+from postproc.compensation.paths.flank_cases import TOGETHER, FlankCase, FlankCases
 from postproc.compensation.paths.plan_outcomes import (
     BEGINS,
     UNDESCRIBED,
@@ -65,7 +65,7 @@ def case(joint: int, first: int, last: int, off: float, moved: float) -> FlankCa
     rows = np.arange(first, last)
     far = np.full(len(rows), off * MM)
     by = np.tile((0.0, moved * MM, 0.0), (len(rows), 1))
-    return FlankCase(joint, FlankKind.ELASTIC, 0.25, rows, far, by)
+    return FlankCase((joint, FlankKind.ELASTIC, 0), 0.25, rows, far, by)
 
 
 def test_harm_is_counted_place_by_place_and_named() -> None:
@@ -184,8 +184,8 @@ def test_friction_may_hold_a_gear_against_other_weights() -> None:
         np.tile([1.0, 0.0, 0.0], (5, 1)), np.linspace(0.0, 0.1, 5), np.array([0, 5]),
     )  # fmt: skip
     held, weighed = cases._of_friction()
-    assert (held.joint, held.kind) == (2, FlankKind.HELD)
-    assert (weighed.joint, weighed.kind) == (2, FlankKind.WEIGHED)
+    assert held.key == (2, FlankKind.HELD, 0)
+    assert weighed.key == (2, FlankKind.WEIGHED, 0)
     assert held.weight > OPEN and weighed.weight > OPEN
     np.testing.assert_array_equal(held.rows, [1, 2])
     np.testing.assert_array_equal(weighed.rows, [3, 4])
@@ -218,8 +218,25 @@ def test_links_that_run_on_at_stops_are_pushed_together_on_the_way() -> None:
         for own in ({FlankKind.PUSHED: 0.24}, {})
     )
     vars(cases).update(_flanks=(pushed, still, pushed, *[still] * 3))
-    assert {case.kind for case in cases.cases} == {FlankKind.PUSHED}
-    assert [case.joint for case in cases.cases] == [1, 3, 1]
+    assert {kind for _, kind, _ in cases.by_key} == {FlankKind.PUSHED}
+    assert [(joint, k) for joint, _, k in cases.by_key] == [(1, 0), (3, 0), (1, -1)]
     far = [case.across.max() for case in cases.cases]
     assert far == pytest.approx([2e-5, 8e-5, 1e-4])
-    assert cases._keys[-1] == (1, FlankKind.PUSHED, 1)
+
+
+def test_a_case_keeps_its_key_where_others_make_no_difference() -> None:
+    """One joint rests in the middle, where it is pushed to neither flank."""
+    side = np.tile([0.0, -1.0, 1.0, 0.0, 0.0, 0.0], (5, 1))
+    run: Any = SimpleNamespace(side=side, least=side, most=side)
+    error: Any = lambda _, rows, there: there[:, :3] * 1e-5  # noqa: E731
+    cases = FlankCases(
+        run, _Holds(error, lambda _: []), np.zeros((5, 3)),
+        np.tile([1.0, 0.0, 0.0], (5, 1)), np.linspace(0.0, 0.1, 5), np.array([0, 5]),
+    )  # fmt: skip
+    kinds = [kind for kind in FlankKind if kind is not FlankKind.START]
+    weight = dict.fromkeys(kinds, 0.0) | {FlankKind.PUSHED: 0.24}
+    vars(cases).update(_flanks=(FlankOfJoint(weight, 1.0, (1.0, 4.0)),) * 6)
+    together = (1, FlankKind.PUSHED, TOGETHER)
+    assert list(cases.by_key) == [
+        (2, FlankKind.PUSHED, 0), (3, FlankKind.PUSHED, 0), together,
+    ]  # fmt: skip
