@@ -296,10 +296,10 @@ def test_a_case_is_where_the_error_is_with_a_joint_on_that_side(
     ).paths
     cases = paths.cases
     assert cases is not None
-    own = [case for case in cases.cases if case.kind is kind]
+    own = [case for case in cases.cases if case.key[1] is kind]
     assert own and all((np.diff(case.rows) > 0).all() for case in own)
     for case in own:
-        joint, rows = case.joint - 1, case.rows
+        joint, rows = case.key[0] - 1, case.rows
         side = np.array(cases.run.side[rows])
         sides = [s for found, _, s in cases.open_sides().of(joint)
                  if found is kind]  # fmt: skip
