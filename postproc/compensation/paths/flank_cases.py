@@ -45,7 +45,7 @@ Key = tuple[int, FlankKind, int]
 The same case has the same key in all predictions, whichever cases make a difference.
 """
 
-TOGETHER = -1
+OF_ALL = -1
 """Number of the case of all joints, in the key of the first of these."""
 
 
@@ -152,7 +152,7 @@ class FlankCases:
         at = np.flatnonzero(by.any(axis=1))
         if len(open_) > 1 and len(at):
             weight = max(self._flanks[j - 1].weight[kind] for j in open_)
-            yield self._case((open_[0], kind, TOGETHER), weight, at, by[at])
+            yield self._case((open_[0], kind, OF_ALL), weight, at, by[at])
 
     @property
     def by_key(self) -> dict[Key, FlankCase]:

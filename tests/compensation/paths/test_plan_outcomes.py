@@ -10,7 +10,7 @@ import pytest
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.expected_error import SIDED
-from postproc.compensation.paths.flank_cases import TOGETHER, FlankCase, FlankCases
+from postproc.compensation.paths.flank_cases import OF_ALL, FlankCase, FlankCases
 from postproc.compensation.paths.plan_outcomes import (
     BEGINS,
     UNDESCRIBED,
@@ -236,7 +236,7 @@ def test_a_case_keeps_its_key_where_others_make_no_difference() -> None:
     kinds = [kind for kind in FlankKind if kind is not FlankKind.START]
     weight = dict.fromkeys(kinds, 0.0) | {FlankKind.PUSHED: 0.24}
     vars(cases).update(_flanks=(FlankOfJoint(weight, 1.0, (1.0, 4.0)),) * 6)
-    together = (1, FlankKind.PUSHED, TOGETHER)
+    together = (1, FlankKind.PUSHED, OF_ALL)
     assert list(cases.by_key) == [
         (2, FlankKind.PUSHED, 0), (3, FlankKind.PUSHED, 0), together,
     ]  # fmt: skip
