@@ -414,10 +414,11 @@ class Table:
 
     def _laws_on(self, carrier: Carrier, factor: str) -> MotionLaws:
         """Return the laws of a factor that are tried on a carrier."""
+        laws = self.laws.get(factor, NO_LAWS)
         if self.only is None:
-            return self.laws.get(factor, NO_LAWS)
+            return laws
         drivers = self.only.get((carrier, factor), NONE)
-        return self.laws[factor].some(drivers) if len(drivers) else NO_LAWS
+        return laws.some(drivers) if len(drivers) else NO_LAWS
 
     def _shares(self, carrier: Carrier, laws: Sequence[MotionLaw]) -> Floats:
         """Return log shares of laws on a carrier, (c,); -inf of those with a name."""

@@ -79,7 +79,7 @@ class FoundGoal:
 
     @property
     def writes(self) -> tuple[int, ...]:
-        """The numbers that may be written anew for this move."""
+        """The numbers that may be rewritten for this move."""
         if self.is_rewritten_by_shift:
             assert self.shift is not None
             return self.shift.slots

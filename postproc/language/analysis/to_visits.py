@@ -286,7 +286,7 @@ class TaskCollector(Collector, ABC):
                 c.slots[rows.start, is_written] = own[is_written]
                 continue
             text = self.machine.texts[v.scope.file]
-            base = int(self.numbering.first[v.scope.file])
+            base = self.machine.task.first_slots[v.scope.file]
             stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
             steps = stride * np.arange(v.count)
             for at in np.flatnonzero(is_written).tolist():  # one by one: short of room

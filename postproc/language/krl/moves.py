@@ -299,10 +299,8 @@ class KrlGoal(goals.GoalReader):
             f if isinstance(f, WrittenNumber) else WrittenNumber(-1.0) for f in flags
         ]
         values = [one.value for one in (*numbers, *written)]
-        slots, file_of = (
-            goals.list_slots(numbers, pose_encoding.WIDTH),
-            self.task.file_of,
-        )
+        slots = goals.list_slots(numbers, pose_encoding.WIDTH)
+        file_of = self.task.file_of
         file = file_of(slots[0])
         own = tuple(one.slot if file_of(one.slot) == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])

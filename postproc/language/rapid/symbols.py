@@ -135,7 +135,8 @@ class RapidTask(TaskSymbols[RapidFile]):
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
             return False
-        text = self.files[file := self.file_of(one.slot)].text
+        file = self.file_of(one.slot)
+        text = self.files[file].text
         row = text.row_of(one.slot - self.first_slots[file])
         return not self.taught_lines[file].isdisjoint(text.lines(row))
 
