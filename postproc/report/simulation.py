@@ -31,11 +31,12 @@ from postproc.simulation import (
     VirtualCell,
     campaign_length,
     gravity_of,
-    land,
-    measure_program,
+    land_runs,
     measure_rows,
+    measure_run,
     parse_effects,
     read_rows,
+    run_program,
     virtual_arm,
     write_measurements,
 )
@@ -248,17 +249,20 @@ def simulate_file(
         tracker=setup.tracker,
         gravity=setup.gravity,
     )
-    campaign = measure_program(arm, setup, visits)
-    track = record_track(arm, setup, visits, rate) if rate else None
+    run = run_program(arm, setup, visits)
+    campaign = measure_run(arm, setup, run, visits)
+    track = record_track(arm, setup, run, rate) if rate else None
     if reference is None and not path:
         return Simulation(program.name, campaign, None, track=track)
-    original = visits if reference is None else visits_of(reference, cell)
-    own = own if reference is not None else np.arange(len(visits))
-    landing = land(arm, setup, original, visits, own)
+    original, asked = visits, run
+    if reference is not None and reference.resolve() != program.resolve():
+        original = visits_of(reference, cell)
+        asked = run_program(arm, setup, original)
+    landing = land_runs(arm, asked, run, own)
     error, left = true_error(landing, original), landing.left_out
     if not path:
         return Simulation(program.name, campaign, error, track=track, left_out=left)
-    scores = score_paths(arm, setup, original, visits, own, skipped)
+    scores = score_paths(arm, setup, asked, run, own, skipped)
     lines = tuple(original.place.line.tolist())
     return Simulation(program.name, campaign, error, scores, lines, track, left)
 

@@ -11,7 +11,13 @@ from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream, virtual_arm
 from postproc.simulation.kinematics import NJ220, Chain, gravity_of
 from postproc.simulation.laws import DEFAULT, NAMES, Planted, parse_effects
-from postproc.simulation.program import Landing, ProgramRun, land, run_program
+from postproc.simulation.program import (
+    Landing,
+    ProgramRun,
+    land,
+    land_runs,
+    run_program,
+)
 from postproc.simulation.state import VirtualArrivals, arrivals_of_states, make_arrivals
 from postproc.simulation.tracker import (
     Campaign,
@@ -21,6 +27,7 @@ from postproc.simulation.tracker import (
     in_tracker_frame,
     measure_program,
     measure_rows,
+    measure_run,
     read_rows,
     sample_survey,
     write_measurements,
@@ -46,9 +53,11 @@ __all__ = [
     "gravity_of",
     "in_tracker_frame",
     "land",
+    "land_runs",
     "make_arrivals",
     "measure_program",
     "measure_rows",
+    "measure_run",
     "parse_effects",
     "read_rows",
     "run_program",

@@ -9,11 +9,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from postproc.arrays import Floats, Ints
-from postproc.language.visits import Visits
-from postproc.robot.trajectory import Motion
 from postproc.simulation.arm import VirtualArm
 from postproc.simulation.controller import VirtualCell
-from postproc.simulation.program import gears_along, run_moves
+from postproc.simulation.program import ProgramRun, gears_along
 from postproc.simulation.state import make_arrivals
 
 STEP = 1e-3  # [m] between places that are looked at
@@ -57,31 +55,32 @@ class _Track:
 def score_paths(
     arm: VirtualArm,
     setup: VirtualCell,
-    original: Visits,
-    executed: Visits | None = None,
+    asked: ProgramRun,
+    done: ProgramRun,
     own: Ints | None = None,
     skipped: Ints | None = None,
 ) -> PathScores:
-    """Run a program and compare its paths with those that the original asks for.
+    """Compare the paths of a program that was run with those of the original.
 
     Args:
-        arm: The arm that runs it.
+        arm: The arm that ran them.
         setup: Its cell.
-        original: The program as it came from the drawing.
-        executed: The compensated program; default the original itself.
+        asked: The program as it came from the drawing.
+        done: The program that is judged; the same one where it is itself.
         own: Its visits that the original makes, (n,), where points were put on ways:
             the pieces of a move are compared with its whole path.
         skipped: Visits of the original whose ways are others now, and not compared.
     """
-    wanted = dict(_tracks(arm, setup, original))
-    done = wanted if executed is None else dict(_tracks(arm, setup, executed))
-    if own is not None and executed is not None:
-        done = _whole(done, own)
+    wanted = dict(_tracks(arm, setup, asked))
+    made, others = wanted, set[int]()
+    if done is not asked:
+        made = dict(_tracks(arm, setup, done))
+        made = made if own is None else _whole(made, own)
+        others = set() if skipped is None else set(skipped.tolist())
     visit, parts = [], []
-    others = set() if skipped is None else set(skipped.tolist())
-    for i in sorted((wanted.keys() & done.keys()) - others):
+    for i in sorted((wanted.keys() & made.keys()) - others):
         visit.append(i)
-        parts.append(_apart(done[i], wanted[i].nominal))
+        parts.append(_apart(made[i], wanted[i].nominal))
     count = [len(way) for way, _, _ in parts]
     columns = [np.concatenate([*c, np.empty(0)]) for c in zip(*parts, strict=True)]
     first = np.append(0, np.cumsum(count)).astype(np.int64)
@@ -104,11 +103,11 @@ def _whole(tracks: dict[int, _Track], own: Ints) -> dict[int, _Track]:
 
 
 def _tracks(
-    arm: VirtualArm, setup: VirtualCell, visits: Visits
+    arm: VirtualArm, setup: VirtualCell, program: ProgramRun
 ) -> Iterator[tuple[int, _Track]]:
     """Follow every Cartesian move, with the gears at every sample."""
-    for run in run_moves(arm, setup, visits):
-        if run.why or visits.motion.kind[run.visit] == Motion.JOINT:
+    for run in program.moves:
+        if run.why or not run.cartesian:
             continue
         q = _finer(run.path, arm.nominal.flange(run.path)[:, :3, 3])
         gears = gears_along(arm, run, q)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -43,6 +43,7 @@ class ProgramRun:
         why: For each visit of the program, why it was not reached, or "".
         left: Indices of fly points from which the program goes on, but not this run:
             how the tool passes them is not known.
+        moves: How the arm went to each visit of the program.
     """
 
     visit: Ints
@@ -50,6 +51,7 @@ class ProgramRun:
     tool_id: Ints
     why: tuple[str, ...]
     left: Ints
+    moves: tuple[DrivenMove, ...]
 
 
 @dataclass(frozen=True)
@@ -77,12 +79,12 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
         setup: Its cell.
         visits: The program.
     """
-    poses, moves = _poses(visits), list[tuple[int, _ProgramPlace]]()
-    for drive, _, place in _places(arm, setup, visits, poses):
-        moves.append((drive.came_from, place))
-    places = [place for _, place in moves]
-    begun = {begin for begin, place in moves if not place.why}
-    return _collect(arm, setup, visits, poses, places, _not_passed(visits, begun))
+    poses = _poses(visits)
+    steps = [*_places(arm, setup, visits, poses)]
+    begun = {drive.came_from for drive, _, place in steps if not place.why}
+    moves, left = _list_moves(visits, poses, steps), _not_passed(visits, begun)
+    places = [place for _, _, place in steps]
+    return _collect(arm, setup, visits, poses, places, left, moves)
 
 
 def _not_passed(visits: Visits, begun: Collection[int]) -> Ints:
@@ -129,6 +131,8 @@ class DrivenMove:
         begins, lasted: When it begins, and how long it takes [s].
         rate: Joint speeds from which it brakes, (6,) [rad/s]; 0 where it goes on.
         why: Why the visit was not reached, or "".
+        cartesian: The TCP follows a path.
+        flies: The arm goes on without a stop.
     """
 
     visit: int
@@ -140,6 +144,8 @@ class DrivenMove:
     lasted: float
     rate: Floats
     why: str
+    cartesian: bool
+    flies: bool
 
 
 def gears_along(arm: VirtualArm, run: DrivenMove, q: Floats) -> dict[str, Floats]:
@@ -158,25 +164,22 @@ def gears_along(arm: VirtualArm, run: DrivenMove, q: Floats) -> dict[str, Floats
     return {name: np.array([getattr(s, name) for s in states]) for name in names}
 
 
-def run_moves(
-    arm: VirtualArm, setup: VirtualCell, visits: Visits
-) -> Iterator[DrivenMove]:
-    """Run a program as `run_program` does, and tell of every move.
-
-    Args:
-        arm: Whose gears and clock.
-        setup: Its cell.
-        visits: The program.
-    """
-    poses, time = _poses(visits), 0.0
-    for i, (drive, before, after) in enumerate(_places(arm, setup, visits, poses)):
+def _list_moves(
+    visits: Visits,
+    poses: Floats,
+    steps: Sequence[tuple[Drive, _ProgramPlace, _ProgramPlace]],
+) -> tuple[DrivenMove, ...]:
+    """Tell of every move as it was run, one after the other."""
+    moves, time = list[DrivenMove](), 0.0
+    for i, (drive, before, after) in enumerate(steps):
         path = np.vstack([before.joints, drive.path])
-        tool = poses[visits.frame.tool[i]]
-        moves = after.lasted - SETTLE
-        yield DrivenMove(
-            i, path, before.gears, tool, after.speed, time, moves, after.rate, after.why
-        )
+        tool, moving = poses[visits.frame.tool[i]], after.lasted - SETTLE
+        told = after.speed, time, moving, after.rate, after.why
+        cartesian = bool(visits.motion.kind[i] != Motion.JOINT)
+        kind = cartesian, bool(visits.motion.fly[i])
+        moves.append(DrivenMove(i, path, before.gears, tool, *told, *kind))
         time += after.lasted
+    return tuple(moves)
 
 
 def _start(arm: VirtualArm, setup: VirtualCell) -> _ProgramPlace:
@@ -242,6 +245,7 @@ def _collect(
     poses: Floats,
     places: list[_ProgramPlace],
     left: Ints,
+    moves: tuple[DrivenMove, ...],
 ) -> ProgramRun:
     """Gather the reached visits."""
     reached = [i for i, p in enumerate(places) if not p.why]
@@ -269,7 +273,7 @@ def _collect(
         payload_com=setup.payload_com,
     )
     why = tuple(p.why for p in places)
-    return ProgramRun(visit, arrivals, tool_id, why, left)
+    return ProgramRun(visit, arrivals, tool_id, why, left, moves)
 
 
 # Where the tool really lands when a program runs, against what was wanted.
@@ -322,15 +326,31 @@ def land(
     """
     asked = run_program(arm, setup, original)
     if executed is None or executed is original:
-        done = asked
-    else:
-        rows = np.arange(len(executed)) if own is None else own
-        if len(rows) != len(original):
+        return land_runs(arm, asked, asked)
+    return land_runs(arm, asked, run_program(arm, setup, executed), own)
+
+
+def land_runs(
+    arm: VirtualArm, asked: ProgramRun, done: ProgramRun, own: Ints | None = None
+) -> Landing:
+    """Compare two programs that were run, see `land`.
+
+    Args:
+        arm: The arm that ran them.
+        asked: The program as it came from the drawing.
+        done: The program that is judged; the same one where it is itself.
+        own: Its visits that the first one makes, (n,), where points were put on ways.
+
+    Raises:
+        PostprocError: The two programs do not have the same visits.
+    """
+    if done is not asked:
+        rows = len(done.why) if own is None else len(own)
+        if rows != len(asked.why):
             raise PostprocError(
-                f"the executed program makes {len(rows)} visits, the original "
-                f"{len(original)}: they are not two versions of one program"
+                f"the executed program makes {len(done.why)} visits, the original "
+                f"{len(asked.why)}: they are not two versions of one program"
             )
-        done = run_program(arm, setup, executed)
     reached, left = done.visit, done.left
     if own is not None and done is not asked:
         reached, left = _among(own, reached), _among(own, left)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,11 +12,10 @@ from scipy.interpolate import CubicSpline
 
 from postproc.arrays import Floats
 from postproc.files import write_all
-from postproc.language.visits import Visits
 from postproc.simulation.arm import VirtualArm
 from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream
-from postproc.simulation.program import SETTLE, DrivenMove, gears_along, run_moves
+from postproc.simulation.program import SETTLE, DrivenMove, ProgramRun, gears_along
 from postproc.simulation.state import make_arrivals
 
 RATE = 100.0  # [Hz]
@@ -51,9 +49,9 @@ class VirtualTrack:
 
 
 def record_track(
-    arm: VirtualArm, setup: VirtualCell, visits: Visits, rate: float = RATE
+    arm: VirtualArm, setup: VirtualCell, run: ProgramRun, rate: float = RATE
 ) -> VirtualTrack:
-    """Run a program, and read the tool's place all the while.
+    """Read the tool's place all the while that a program runs.
 
     The tracker's clock begins some time before the program. The arm stands still after
     every move that does not fly, and begins and ends moves without ramps. What does
@@ -62,12 +60,12 @@ def record_track(
     Args:
         arm: The arm that runs it.
         setup: Its cell.
-        visits: The program.
+        run: The program that was run.
         rate: Readings in a second [Hz].
     """
     rng = stream(arm.seed, "track")
     lead = float(rng.uniform(*LEAD))
-    moves = list(_moves(arm, setup, visits, rate))
+    moves = [_places(arm, setup, one, rate) for one in run.moves if not one.why]
     before = [np.repeat(move[:1], int(lead * rate), axis=0) for move in moves[:1]]
     real = np.concatenate([np.empty((0, 3)), *before, *moves])
     span = np.linalg.norm(real - setup.tracker, axis=1)
@@ -76,17 +74,8 @@ def record_track(
     return VirtualTrack(np.arange(len(real)) / rate, measured)
 
 
-def _moves(
-    arm: VirtualArm, setup: VirtualCell, visits: Visits, rate: float
-) -> Iterator[Floats]:
-    """Yield where the tool is along every move that is driven, (k, 3) [m]."""
-    for run in run_moves(arm, setup, visits):
-        if not run.why:
-            yield _places(arm, setup, run, bool(visits.motion.fly[run.visit]), rate)
-
-
 def _places(
-    arm: VirtualArm, setup: VirtualCell, run: DrivenMove, flies: bool, rate: float
+    arm: VirtualArm, setup: VirtualCell, run: DrivenMove, rate: float
 ) -> Floats:
     """Place the tool at every reading of a move and of the stop behind it, (k, 3)."""
     q = _in_time(run.path, max(int(run.lasted * rate), 1))
@@ -98,7 +87,7 @@ def _places(
         payload=setup.payload, payload_com=setup.payload_com,
     )  # fmt: skip
     places = arm.tcp(states)
-    stands = 0 if flies else int(SETTLE * rate)
+    stands = 0 if run.flies else int(SETTLE * rate)
     return np.concatenate([places, np.repeat(places[-1:], stands, axis=0)])
 
 

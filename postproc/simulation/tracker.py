@@ -18,7 +18,7 @@ from postproc.simulation.arm import VirtualArm, at_start, move
 from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream
 from postproc.simulation.kinematics import exponential
-from postproc.simulation.program import run_program
+from postproc.simulation.program import ProgramRun, run_program
 from postproc.simulation.reference import (
     APPROACH,
     MEASURED_EVERY,
@@ -271,7 +271,13 @@ def measure_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> Camp
     The visits with a MEASURE comment are measured, under its id; without any such
     comment all visits are, under their numbers from 1.
     """
-    run = run_program(arm, setup, visits)
+    return measure_run(arm, setup, run_program(arm, setup, visits), visits)
+
+
+def measure_run(
+    arm: VirtualArm, setup: VirtualCell, run: ProgramRun, visits: Visits
+) -> Campaign:
+    """Measure a program that was run, see `measure_program`."""
     marked = np.array([bool(visits.place.measure_id[i]) for i in run.visit], dtype=bool)
     if marked.any():
         ids = [visits.place.measure_id[i] for i in run.visit[marked]]

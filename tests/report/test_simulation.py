@@ -11,7 +11,7 @@ import pytest
 from postproc.calibration.fit import fit
 from postproc.calibration.survey_program import write_survey
 from postproc.language.languages import language_of_text
-from postproc.report.simulation import chain_of, setup_of, simulate_file
+from postproc.report.simulation import chain_of, setup_of, simulate_file, visits_of
 from postproc.robot.arm_file import arm_path, list_shipped_arms, read_arm_file
 from postproc.robot.cell import load_cell
 from postproc.simulation import NJ220, land, virtual_arm
@@ -60,8 +60,6 @@ def test_readings_are_the_landing_with_a_trackers_noise(desk, job_cell):
     out = desk.folder / "m.csv"
     found = simulate_file(source, desk.cell, SEED, reference=source)
     found.write(out)
-    from postproc.report.simulation import visits_of
-
     landed = land(
         virtual_arm(SEED, tool=job_cell.tool.pose),
         setup_of(job_cell),
@@ -84,6 +82,13 @@ def test_a_compensated_program_misses_less(desk):
     ]  # fmt: skip
     assert errors[0]["n"] == errors[1]["n"] == 5
     assert errors[1]["mean_mm"] < 0.2 * errors[0]["mean_mm"]
+
+
+def test_a_program_may_be_its_own_reference(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT, POSE, NEXT))
+    alone = simulate_file(source, desk.cell, SEED, path=True)
+    itself = simulate_file(source, desk.cell, SEED, reference=source, path=True)
+    assert alone.to_json() == itself.to_json() and len(alone.paths.visit) == 4
 
 
 FLY = f"MOVEFLY {POSE.removeprefix('MOVE ')} ADVANCE"

@@ -7,6 +7,7 @@ from postproc.exceptions import PostprocError
 from postproc.language.visits import ELSEWHERE, Blend, ZoneRule
 from postproc.robot.trajectory import Motion
 from postproc.simulation import VirtualCell, land, run_program, virtual_arm
+from postproc.simulation.path import score_paths
 from tests.simulation.builders import Program
 
 ARM = virtual_arm(2)
@@ -89,3 +90,13 @@ def test_a_fly_point_before_what_is_not_followed_is_left_out() -> None:
     program.rows[0]["pred"] = [ELSEWHERE]  # the last visit does not stand before it
     program.rows[2]["fly"], program.rows[4]["fly"] = False, True
     assert land(ARM, SETUP, program.visits()).left_out == 0
+
+
+def test_no_move_is_skipped_where_a_program_is_compared_with_itself():
+    run = run_program(ARM, SETUP, grid().visits())
+    every, one = (
+        score_paths(ARM, SETUP, run, run, skipped=skipped)
+        for skipped in (None, np.array([2]))
+    )
+    np.testing.assert_array_equal(every.visit, one.visit)
+    assert len(every.visit)

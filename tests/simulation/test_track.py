@@ -25,7 +25,7 @@ def test_the_arm_is_read_where_it_is():
     arm, visits = virtual_arm(3).without_noise(), program()
     run = run_program(arm, SETUP, visits)
     assert run.why == ("",) * 3
-    track = record_track(arm, SETUP, visits, 200.0)
+    track = record_track(arm, SETUP, run, 200.0)
     landed = arm.tcp(run.arrivals)
     for place in landed:
         apart = np.linalg.norm(track.position - place, axis=1)
@@ -38,10 +38,11 @@ def test_the_arm_is_read_where_it_is():
 
 
 def test_readings_scatter_as_the_tracker_does_and_are_seeded():
-    arm, visits = virtual_arm(3), program()
-    one, other = (record_track(arm, SETUP, visits, 100.0) for _ in range(2))
+    arm = virtual_arm(3)
+    run = run_program(arm, SETUP, program())
+    one, other = (record_track(arm, SETUP, run, 100.0) for _ in range(2))
     np.testing.assert_array_equal(one.position, other.position)
-    quiet = record_track(arm.without_noise(), SETUP, visits, 100.0)
+    quiet = record_track(arm.without_noise(), SETUP, run, 100.0)
     off = one.position - quiet.position
     span = np.linalg.norm(quiet.position - SETUP.tracker, axis=1)
     sigma = arm.tracker_noise[0] + arm.tracker_noise[1] * span
@@ -49,7 +50,8 @@ def test_readings_scatter_as_the_tracker_does_and_are_seeded():
 
 
 def test_it_is_written_in_millimetres(tmp_path):
-    track = record_track(virtual_arm(3), SETUP, program(), 50.0)
+    arm = virtual_arm(3)
+    track = record_track(arm, SETUP, run_program(arm, SETUP, program()), 50.0)
     track.write(tmp_path / "t.csv")
     head, first, *_ = (tmp_path / "t.csv").read_text().splitlines()
     assert head == "time_s,x_mm,y_mm,z_mm"
