@@ -29,6 +29,7 @@ LAYERS = (
     ("report",),
     ("batch",),
     ("cli",),
+    ("__main__",),
 )
 LAYER = {chapter: k for k, layer in enumerate(LAYERS) for chapter in layer}
 LEAVES = {

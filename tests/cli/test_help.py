@@ -138,6 +138,12 @@ def test_pictures_need_an_extra_and_that_is_reported_before_any_work(monkeypatch
     assert Reports.of([Path("a.json")], *PLOTS).json == (Path("a.json"),)
 
 
+def test_the_package_is_the_command():
+    command = [sys.executable, "-m", "postproc", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, f"postproc {__version__}\n")
+
+
 def test_the_version_is_printed_without_loading_the_command_line():
     code = (
         "import sys; sys.argv = ['postproc', '--version']\n"
