@@ -15,7 +15,7 @@ that is within 0.05 mm and that is nearer than without, the share of moves whose
 holds, and of those that stay within their largest deviation by any open hypothesis, the
 share of the way of moves with an end that a guard rejects, and the largest deviation of
 the others, the moves with points, and the median of points a move, of all moves and of
-those with any.
+those with any. The last lines sum up every state over all arms.
 """
 
 from __future__ import annotations
@@ -167,6 +167,7 @@ def compared(
         "nearer": (off < before - NEARER).mean(),
         "kept": np.mean(kept) if kept else np.nan,
         "bounded": np.mean(bounded) if bounded else np.nan,
+        "promised": len(kept),
         "guarded": held.mean(),
         "max of others": 1e3 * off[~held].max(initial=0.0),
     }
@@ -185,6 +186,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path)
     given = parser.parse_args()
     scatter = np.full(6, given.repeats * 1e-6)
+    rows: dict[str, list[dict[str, float]]] = {state: [] for state in given.states}
     with (
         tempfile.TemporaryDirectory() as temporary,
         patch.object(draw, "backlash", gaps_between(*given.half)),
@@ -194,9 +196,11 @@ def main() -> None:
             place = (given.folder or Path(temporary)) / f"{given.gears}{seed}"
             bench = Bench(seed, place, given.lines, given.gears)
             for state in given.states:
-                row(bench, state, given.tolerance)
+                rows[state].append(row(bench, state, given.tolerance))
             if given.gears == MIXED:
                 print(joints(bench), flush=True)
+    for state, found in rows.items():
+        print(f"{state:16} {sum_up(found)}")
 
 
 def joints(bench: Bench) -> str:
@@ -213,8 +217,29 @@ def joints(bench: Bench) -> str:
     return f"{bench.seed:4d} joint " + "; ".join(found)
 
 
-def row(bench: Bench, state: str, tolerance: str) -> None:
-    """Print one state of knowledge of one arm."""
+def sum_up(found: list[dict[str, float]]) -> str:
+    """Sum up a state of knowledge over all arms."""
+    arms, last = len(found), {key: [one[key] for one in found] for key in found[0]}
+    low = sum(size <= 1e3 * NEAR for size in last["95 %"])
+    moves = sum(last["promised"])
+    kept, bounded = (
+        round(np.nansum(np.multiply(last[name], last["promised"])))
+        for name in ("kept", "bounded")
+    )
+    largest = ", ".join(
+        f"{name} {max(last[name]):.3f}"
+        for name in ("95 %", "max", "max of others", "worse", "at starts")
+    )
+    return (
+        f"95 % within {1e3 * NEAR:g} mm on {low} of {arms} arms, promises kept "
+        f"{kept} of {moves}, largest {bounded} of {moves}, moves with points "
+        f"{sum(last['split'])}, nearer {np.mean(last['nearer']):.2f}; at the most "
+        f"{largest}, points {max(last['points']):.0f}"
+    )
+
+
+def row(bench: Bench, state: str, tolerance: str) -> dict[str, float]:
+    """Print one state of knowledge of one arm, and return it."""
     knows, _, stops = state.partition("+")
     bench.compensate(knows, ())
     without = bench.run(knows)
@@ -228,12 +253,16 @@ def row(bench: Bench, state: str, tolerance: str) -> None:
     some = [count for count in points if count] or [0]
     print(
         f"{bench.seed:4d} {state:16} without {usual['95 %']:.3f} {usual['max']:.3f}  "
-        + "  ".join(f"{key} {value:.3f}" for key, value in found.items())
+        + "  ".join(
+            f"{key} {value:.3f}" for key, value in found.items() if key != "promised"
+        )
         + f"  moves {sum(map(bool, points))}/{len(told)} points {np.median(points):.0f}"
         + f" where any {np.median(some):.0f}, at most {max(some)}"
         + f"  {report['path_accuracy']['after']['max_mm']:.3f} predicted",
         flush=True,
     )
+    split, middle = sum(map(bool, points)), float(np.median(points))
+    return {**found, "split": split, "points": middle}
 
 
 if __name__ == "__main__":
