@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
@@ -221,10 +221,10 @@ class Gears:
 
 @dataclass(frozen=True)
 class GearState:
-    """Where the gears are; all (6,), angles on the motor side [rad].
+    """Where the gears are, (6,), or at m places one after the other, (m, 6) each.
 
     Attributes:
-        angle: Present angle.
+        angle: Present angle on the motor side [rad], as all angles here.
         side: Place in a sharp gap by the way alone, -1 .. 1.
         flank: Place in the gap, -1 .. 1.
         heading: Direction of the last motion that was more than the gap, +1 or -1.
@@ -243,13 +243,17 @@ class GearState:
 
     @property
     def travel(self) -> Floats:
-        """Way since the last reversal, (6,) [rad]."""
+        """Way since the last reversal [rad]."""
         return np.abs(self.angle - self.turn)
 
     @property
     def loop(self) -> Floats:
-        """Way between the last two reversals, (6,) [rad]."""
+        """Way between the last two reversals [rad]."""
         return np.abs(self.turn - self.turn_before)
+
+    def at(self, k: int) -> GearState:
+        """Return the state at one of the places."""
+        return GearState(*(column[k] for column in vars(self).values()))
 
 
 def at_start(gears: Gears, q: Floats, side: Floats) -> GearState:
@@ -260,21 +264,20 @@ def at_start(gears: Gears, q: Floats, side: Floats) -> GearState:
 
 
 def move(gears: Gears, state: GearState, path: Floats) -> GearState:
-    """Follow a joint path.
+    """Follow a joint path; return the state at its end.
 
     Args:
         gears: Gaps and coupling.
         state: The state before.
         path: Joint angles, (m, 6) [rad]; between two of them every joint moves one way.
     """
-    return _steps(
-        gears, state, turning_points(np.vstack([state.angle, path @ gears.coupling.T]))
-    )[-1]
+    angles = np.vstack([state.angle, path @ gears.coupling.T])
+    return _steps(gears, state, turning_points(angles)).at(-1)
 
 
-def follow(gears: Gears, state: GearState, path: Floats) -> list[GearState]:
-    """Follow a joint path (m, 6) as `move` does; return the state at every place."""
-    return _steps(gears, state, path @ gears.coupling.T)[1:]
+def follow(gears: Gears, state: GearState, path: Floats) -> GearState:
+    """Follow a joint path (m, 6) as `move` does; return the states before and on it."""
+    return _steps(gears, state, path @ gears.coupling.T)
 
 
 def turning_points(path: Floats) -> Floats:
@@ -287,32 +290,56 @@ def turning_points(path: Floats) -> Floats:
     return np.asarray(path[1:][keep])
 
 
-def _steps(gears: Gears, state: GearState, angles: Floats) -> list[GearState]:
-    """Move every motor one way to angles (m, 6); return the states before and there."""
-    states = [state]
-    for angle, gap in zip(angles, gears.half_gaps(angles), strict=True):
-        states.append(_step(gears, states[-1], angle, gap))
-    return states
-
-
-def _step(gears: Gears, state: GearState, angle: Floats, gap: Floats) -> GearState:
-    """Move every motor one way to the given angles (6,), over half gaps (6,)."""
+def _steps(gears: Gears, state: GearState, angles: Floats) -> GearState:
+    """Move every motor one way to angles after angles (m, 6); return m + 1 states."""
+    gap, every = gears.half_gaps(angles), np.vstack([state.angle, angles])
     reach = gap * np.where(gears.are(GearKind.ELASTIC), gears.reach, 1.0)
-    side, flank = (
-        np.clip(place + (angle - state.angle) / most, -1.0, 1.0)
+    moved = np.diff(every, axis=0)
+    (side,), (flank,) = (
+        _each(_cross, place, moved / most)
         for place, most in ((state.side, gap), (state.flank, reach))
     )
-    advance = state.heading * (angle - state.extreme)
-    reversed_ = advance < -gap
-    return GearState(
-        angle=angle,
-        side=side,
-        flank=flank,
-        heading=np.where(reversed_, -state.heading, state.heading),
-        extreme=np.where(reversed_ | (advance > 0), angle, state.extreme),
-        turn=np.where(reversed_, state.extreme, state.turn),
-        turn_before=np.where(reversed_, state.turn, state.turn_before),
-    )
+    known = state.heading, state.extreme, state.turn, state.turn_before
+    return GearState(every, side, flank, *_each(_turn, *known, angles, gap))
+
+
+def _each(
+    follow_one: Callable[..., Iterator[tuple[float, ...]]], *columns: Floats
+) -> Floats:
+    """Follow six motors one by one: what happens at a place is too small for arrays.
+
+    Args:
+        follow_one: Yields k numbers of a motor, before it moves and at m places.
+        columns: What it is given of each, (6,) or (m, 6).
+
+    Returns:
+        (k, m + 1, 6).
+    """
+    given = zip(*(column.T.tolist() for column in columns), strict=True)
+    return np.array([[*follow_one(*own)] for own in given]).transpose(2, 1, 0)
+
+
+def _cross(place: float, ways: Sequence[float]) -> Iterator[tuple[float]]:
+    """Follow a place in a gap over ways that are parts of it."""
+    yield (place,)
+    for way in ways:
+        place = min(max(place + way, -1.0), 1.0)
+        yield (place,)
+
+
+def _turn(
+    heading: float, extreme: float, turn: float, turn_before: float,
+    angles: Sequence[float], gaps: Sequence[float],
+) -> Iterator[tuple[float, ...]]:  # fmt: skip
+    """Follow the reversals of a motor."""
+    yield heading, extreme, turn, turn_before
+    for angle, gap in zip(angles, gaps, strict=True):
+        advance = heading * (angle - extreme)
+        if advance < -gap:
+            turn_before, turn, extreme, heading = turn, extreme, angle, -heading
+        elif advance > 0:
+            extreme = angle
+        yield heading, extreme, turn, turn_before
 
 
 # The virtual arm: where the tool really goes, and what a laser tracker reads there.

@@ -156,12 +156,15 @@ def gears_along(arm: VirtualArm, run: DrivenMove, q: Floats) -> dict[str, Floats
         run: The move.
         q: Joints, evenly along it, from where the arm stands, (k, 6) [rad].
     """
-    states = [run.gears, *follow(arm.gears, run.gears, q[1:])]
+    states = follow(arm.gears, run.gears, q[1:])
     brakes = np.linspace(0.0, run.lasted, len(q)) > run.lasted - BRAKES
-    for k in np.flatnonzero(brakes & bool(run.rate.any())).tolist():
-        states[k] = arm.gears.brake(states[k], run.rate)
-    names = ("side", "flank", "travel", "loop")
-    return {name: np.array([getattr(s, name) for s in states]) for name in names}
+    flank = arm.gears.brake(states, run.rate).flank
+    return {
+        "side": states.side,
+        "flank": np.where(brakes[:, None], flank, states.flank),
+        "travel": states.travel,
+        "loop": states.loop,
+    }
 
 
 def _list_moves(

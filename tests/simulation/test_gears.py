@@ -100,7 +100,7 @@ def test_a_link_rests_while_its_motor_crosses_the_gap(seed: int) -> None:
         assert (np.abs(gap / arm.gears.gap - 1) > 1e-3).all()
         way = q - np.linspace(0.0, 2.4, 25)[:, None] * gap
         before = at_start(arm.gears, q, np.ones(6))
-        side = np.array([s.side for s in [before, *follow(arm.gears, before, way[1:])]])
+        side = follow(arm.gears, before, way[1:]).side
         np.testing.assert_allclose(side, np.clip(1 - (q - way) / gap, -1, 1), atol=2e-3)
         joints = arm_joints(arm, way, side)
         np.testing.assert_allclose(joints[:21], np.tile(joints[0], (21, 1)), atol=1e-7)
@@ -125,8 +125,7 @@ def shown(kind: str, path: np.ndarray, gears: Gears | None = None) -> np.ndarray
     """Follow a path from rest on a forward flank; return what the links show."""
     gears = gears or replace(GEARS, kinds=(GearKind(kind),) * 6)
     states = follow(gears, at_start(gears, path[0], np.ones(6)), path[1:])
-    flank = np.array([s.flank for s in states])
-    return gears.show_sides(make_arrivals(path[1:], flank=flank))
+    return gears.show_sides(make_arrivals(path[1:], flank=states.flank[1:]))
 
 
 def test_the_kind_of_the_gears_changes_nothing_else() -> None:
