@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, ClassVar, TypeVar
 
-from postproc.diagnostics import Code, Reason
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import AssignedPoint, Scope
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundShift,
-    explain_components,
-    hold_numbers,
-    spell_element,
+from postproc.language.analysis.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Points,
+    Scope,
 )
+from postproc.language.analysis.found_goals import FoundGoal, FoundShift, hold_numbers
+from postproc.language.analysis.origins import Origins
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
+from postproc.robot.trajectory import Motion
 
+MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
 RUN_TIME = "it is known only when the program runs"
 AT_RUN_TIME = Reason(
     Code.RUNTIME_VALUE, "the target is known only when the program runs"
@@ -228,19 +232,19 @@ class GoalReader(ABC):
         steps = operand.steps if isinstance(operand, ir.DataObject) else ()
         spelt = ""
         for step in steps:
-            index = ",".join(map(str, self._index(step) or ()))
-            inside = f"{self.brackets[0]}{index}{self.brackets[1]}"
+            inside = self._spell_index(self._index(step) or ())
             spelt += f".{step}" if isinstance(step, str) else inside
         return spelt
+
+    def _spell_index(self, index: tuple[int, ...]) -> str:
+        return f"{self.brackets[0]}{','.join(map(str, index))}{self.brackets[1]}"
 
     # What assignments gave.
 
     def _read_held(self, held: AssignedPoint) -> FoundGoal:
         """Read the destination that assignments gave to a point."""
-        there, name = self.at(held.scope), spell_element(held, self.brackets)
-        goal = self.unknown(AT_RUN_TIME)
-        if held.operand is not None:
-            goal = there.goal(held.operand)
+        name = held.name + (self._spell_index(held.index) if held.index else "")
+        goal = held.goal or self.unknown(AT_RUN_TIME)
         goal = replace(goal, names=goal.names | held.names)
         why = []
         for place in held.chain:
@@ -256,8 +260,8 @@ class GoalReader(ABC):
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
         doubtful = goal.doubtful
-        if goal.target == Meaning.UNKNOWN and held.operand is not None:
-            doubtful |= self.task.names_of(held.operand)
+        if goal.target == Meaning.UNKNOWN and held.goal is not None:
+            doubtful |= held.names
         return replace(goal, name=name, pins=pins, shift=shift, doubtful=doubtful)
 
     def _set_components(
@@ -269,15 +273,45 @@ class GoalReader(ABC):
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial
         known = known and self.is_followed_whole(held, value)
-        why = explain_components(held, name, self.task.files, known)
+        why = self._explain_components(held, name, known)
         own = found.why.code not in (*_OF_NUMBERS, Code.RUNTIME_VALUE)
-        if held.operand is not None and own:
+        if held.goal is not None and own:
             why = found.why
         if not known:
             return hold_numbers(base, name, why, pins)
         return hold_numbers(
             base, name, why, pins, found.target, found.values, found.aux
         )
+
+    def _explain_components(
+        self, held: AssignedPoint, name: str, known: bool
+    ) -> Reason:
+        """Say which components are set by themselves, and where.
+
+        Args:
+            held: The point.
+            name: As it is spelt.
+            known: All of its numbers are known.
+        """
+        late = [one for one in held.components if one.value is None]
+        meant, files = late or held.components, self.task.files
+        lines = sorted(
+            {(one.file, files[one.file].text.line(one.row)) for one in meant}
+        )
+        places = []
+        for file, rows in groupby(lines, itemgetter(0)):
+            own = [str(line) for _, line in rows][:MOST_NAMED]
+            where = f"line{'s' * (len(own) > 1)} {', '.join(own)}"
+            places.append(f"{where} of {files[file].text.source.name}")
+        parts = ", ".join(one.name for one in meant[:MOST_PARTS])
+        more = len(meant) - MOST_PARTS
+        parts += f" and {more} more" if more > 0 else ""
+        text = f"{name}: {parts} set in {', '.join(places)}"
+        if late:
+            text = f"{text} to what is known only when the program runs"
+        elif not known:
+            text = f"{text}; its other numbers are known only when the program runs"
+        return Reason(Code.COMPUTED_TARGET if known else Code.RUNTIME_VALUE, text)
 
     # Shifts: the point is moved along.
 
@@ -329,3 +363,44 @@ def list_slots(numbers: Sequence[WrittenNumber], width: int) -> tuple[int, ...]:
     if min(slots, default=-1) < 0:
         return (-1,) * width
     return slots + (-1,) * (width - len(slots))
+
+
+@dataclass
+class FoundVisit:
+    """One arrival, as it is found.
+
+    Attributes:
+        scope: Where the move stands.
+        motion, via: `Motion`, and whether it is the point of an arc.
+        goal: Where it goes.
+        modes: What holds there.
+        origins: Where it may come from.
+        why: Why it cannot be compensated.
+        arc_angle: As in `Visits` [rad].
+        block: Tells the curves apart that visits are points of, None for none.
+        curved: As in `Visits`.
+        count: How many moves it stands for that follow each other and differ only in
+            where they go: this one is the first.
+        points: What points hold where it was read.
+        left: With what the program went on behind it the last time: modes, points, and
+            where else the arm may come from.
+    """
+
+    scope: Scope
+    motion: Motion
+    via: bool
+    goal: FoundGoal
+    modes: Any
+    origins: Origins = frozenset()
+    why: Reason = NO_REASON
+    arc_angle: float = math.nan
+    block: Hashable = None
+    curved: bool = False
+    count: int = 1
+    points: Points = NO_POINTS
+    left: tuple[Any, Any, Origins] | None = None
+
+    @property
+    def row(self) -> int:
+        """The row of the move in its file."""
+        return self.scope.row

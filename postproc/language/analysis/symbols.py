@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -26,6 +26,7 @@ from postproc.language.analysis.assigned_points import (
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
+from postproc.language.analysis.found_goals import FoundGoal
 from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
@@ -65,6 +66,7 @@ class TaskSymbols(ABC, Generic[F]):
         uncertain: Operators whose result kinds of numbers, or controllers, decide.
         apart: Data may be declared in one place and get their first value elsewhere.
         volatile: Names of data that may change at any time, by what runs beside.
+        read_goal: Reads where a move to a point leads.
     """
 
     files: Sequence[F]
@@ -80,6 +82,9 @@ class TaskSymbols(ABC, Generic[F]):
     uncertain: ClassVar[Collection[str]] = ("DIV", "MOD")
     apart: ClassVar[bool] = False
     volatile: frozenset[str] = field(default=frozenset(), init=False)
+    read_goal: Callable[[ir.Operand, Scope], FoundGoal | None] = field(
+        default=lambda operand, here: None, init=False
+    )
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
         default_factory=lambda: defaultdict(dict), init=False
     )
@@ -586,7 +591,7 @@ class TaskSymbols(ABC, Generic[F]):
         whole = _without_components(data)
         held = self.find_held(whole, here)
         if held is not None:
-            value = self.evaluate_held(held, depth)
+            value = self.evaluate_held(held)
             return value, steps[len(whole.steps) :], self.type_of(held.place)
         for _, operand, there in self.find_given(ir.DataObject(name), here):
             return self.value(operand, there, depth + 1), steps, ""
@@ -680,16 +685,12 @@ class TaskSymbols(ABC, Generic[F]):
         own = (known or names) if self.by_name else (fields or names)
         return [(name, known.get(name)) for name in own]
 
-    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> Value | None:
+    def evaluate_held(self, held: AssignedPoint) -> Value | None:
         """Evaluate what assignments gave to data, None where it is not known."""
-        type_, base = self.type_of(held.place), None
-        if held.operand is not None:
-            base = self.value(held.operand, held.scope, depth)
-        if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
-            base = None
+        base, layout = held.base, self.layouts.get(self.type_of(held.place), {})
         if not held.components:
             return base
-        names = spell_components(layout := self.layouts.get(type_, {}), "")
+        names = spell_components(layout, "")
         fields = take_apart(base, names)
         for one in held.components:
             fields.pop(one.name, None)
@@ -697,9 +698,7 @@ class TaskSymbols(ABC, Generic[F]):
                 fields[one.name] = WrittenNumber(one.value)
         if self.by_name and layout:
             known = all(one.value is not None for one in held.components)
-            known &= held.operand is None or (
-                isinstance(base, KnownRecord) and base.whole
-            )
+            known &= held.goal is None or (isinstance(base, KnownRecord) and base.whole)
             return KnownRecord(tuple(fields.items()), known)
         return put_together(fields, layout) if len(fields) >= len(names) else None
 
@@ -711,14 +710,12 @@ class TaskSymbols(ABC, Generic[F]):
         if self.type_of(one.place) not in self.targets:
             mine, theirs = map(without_places, map(self.evaluate_held, (one, other)))
             return mine is not None and mine == theirs
-        if (one.copied, one.operand is None) != (other.copied, other.operand is None):
+        if (one.copied, one.goal is None) != (other.copied, other.goal is None):
             return False
         parts = [[(c.name, c.value) for c in p.components] for p in (one, other)]
         if parts[0] != parts[1] or any(value is None for _, value in parts[0]):
             return False
-        bases = (self.evaluate_held(replace(p, components=())) for p in (one, other))
-        mine, theirs = bases
-        return mine == theirs and (mine is None or is_written(mine))
+        return one.base == other.base and (one.base is None or is_written(one.base))
 
     def names_of(self, operand: ir.Operand) -> frozenset[str]:
         """Return the names of all data and functions in an operand."""
@@ -764,34 +761,40 @@ class TaskSymbols(ABC, Generic[F]):
         self, part: PointPart, index: tuple[int, ...], value: ir.Operand, here: Scope,
     ) -> AssignedPoint:  # fmt: skip
         """Return what a point holds that is given a value, or a component of it."""
-        place, points, own = part.place, here.points, frozenset([part.place[-1]])
-        plain = replace(here, points=NO_POINTS)
-        known = self.find_held(value, here)
-        if known is not None and not part.component:
-            copied = (known.copied | {known.place}) - {place}
-            return replace(
-                known, place=place, index=index, copied=copied, names=known.names | own
-            )
-        inside = self._points_in(value, here)
+        place, own = part.place, frozenset([part.place[-1]])
+        known = None if part.component else self.find_held(value, here)
+        if known is not None:
+            return known.copy_to(place, index, own)
+        wholes = map(_without_components, ir.data_in(value))
+        inside = [held for one in wholes if (held := self.find_held(one, here))]
         names = self.names_of(value).union(own, *(point.names for point in inside))
-        if not part.component and self._is_steady(value, here):
-            return AssignedPoint(place, value, plain, index, names=names)
-        found = self.evaluate_components(part, value, here)
-        numbers = [
-            Component(name, number, here.file, here.row) for name, number in found
-        ]
+        plain = replace(here, points=NO_POINTS)
         if part.component:
-            before = points.held.get((place, index))
-            point = before or AssignedPoint(place, None, plain, index)
-            return point.with_components(numbers, names)
-        source = source_of(value)
-        base = self.find_held(source, here)
-        if base is None:
-            point = AssignedPoint(place, source, plain, index)
+            point = here.points.held.get((place, index)) or AssignedPoint(place, index)
+        elif self.value(value, here) == self.value(value, plain):
+            return self._give_whole(part, index, value, plain).copy_to(
+                place, index, names
+            )
         else:
-            copied = (base.copied | {base.place}) - {place}
-            point = replace(base, place=place, index=index, copied=copied)
+            source = source_of(value)
+            base = self.find_held(source, here)
+            point = base or self._give_whole(part, index, source, plain)
+            point = point.copy_to(place, index, own)
+        found = self.evaluate_components(part, value, here)
+        numbers = [Component(*one, here.file, here.row) for one in found]
         return point.with_components(numbers, names)
+
+    def _give_whole(
+        self, part: PointPart, index: tuple[int, ...], value: ir.Operand | None,
+        here: Scope,
+    ) -> AssignedPoint:  # fmt: skip
+        """Return what a point holds that is given what no assignment changes."""
+        base, goal, type_ = self.value(value, here), None, self.type_of(part.place)
+        if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
+            base = None
+        if value is not None and type_ in self.targets:
+            goal = self.read_goal(value, here)
+        return AssignedPoint(part.place, index, base, goal)
 
     def find_returned(
         self, call: ir.FunctionCall, here: Scope
@@ -828,21 +831,6 @@ class TaskSymbols(ABC, Generic[F]):
                 return None
             points = self.assign(points, one, scope)
         return None
-
-    def _points_in(self, value: ir.Operand, here: Scope) -> list[AssignedPoint]:
-        """List what assignments gave to data, or elements, that a value names."""
-        if not here.points.routines:
-            return []
-        wholes = map(_without_components, ir.data_in(value))
-        found = (self.find_held(data, here) for data in wholes)
-        return [one for one in found if one is not None]
-
-    def _is_steady(self, value: ir.Operand, here: Scope) -> bool:
-        """Return True if no assignment on the way changes what a value is."""
-        if not here.points.routines:
-            return True
-        plain = self.value(value, replace(here, points=NO_POINTS))
-        return self.value(value, here) == plain
 
 
 def _without_components(data: ir.DataObject) -> ir.DataObject:

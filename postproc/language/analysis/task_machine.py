@@ -181,6 +181,12 @@ class TaskMachine(Interpreter[Arrived]):
         default_factory=dict
     )
 
+    def __post_init__(self) -> None:
+        """Let assignments read where moves to points lead."""
+        self.task.read_goal = lambda operand, here: self.goals.reader(here).goal(
+            operand
+        )
+
     @cached_property
     def texts(self) -> Sequence[StatementText[Any]]:
         """The statements of all files, the main one first."""

@@ -27,12 +27,8 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import visits
 from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.conditions import Conditions, Zone
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundVisit,
-    array_of,
-    whole_name,
-)
+from postproc.language.analysis.found_goals import FoundGoal, array_of, whole_name
+from postproc.language.analysis.goals import FoundVisit
 from postproc.language.analysis.move_runs import within
 from postproc.language.analysis.origins import Origins, number_origins
 from postproc.language.analysis.task_machine import TaskMachine

@@ -14,7 +14,7 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import AssignedPoint, Points, Scope
-from postproc.language.analysis.found_visits import FoundGoal, FoundVisit, not_reached
+from postproc.language.analysis.found_goals import FoundGoal, hold_numbers, not_reached
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
@@ -37,6 +37,7 @@ def no_target(text: str) -> Reason:
 HOME = ("xhome", "home", "$h_pos")  # that of the cell, where no file says more
 HOMES = (*HOME, "xhome1", "xhome2", "xhome3", "xhome4", "xhome5", "$axis_home")
 AT_HOME = no_target("it is a home position")
+STAYS = no_target("it stays where it is")
 PRESENT = ("$pos_act", "$axis_act")
 BEFORE = ("$axis_act_meas", "$axis_int", "$pos_int")  # where it was, or nearly is
 SPLINE = Reason(
@@ -74,7 +75,7 @@ ANGLE = Reason(
 
 
 @dataclass
-class KrlVisit(FoundVisit):
+class KrlVisit(goals.FoundVisit):
     """One arrival, as it is found.
 
     Attributes:
@@ -124,18 +125,17 @@ class KrlGoals:
                 isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
             )
         if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._reader(move, here).goal(move.to), SPLINE)
+            goal = not_reached(self._read(move, move.to, here), SPLINE)
             yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
             return
         there = replace(here, points=points) if points.routines else here
-        reader = self._reader(move, there)
         angle = math.radians(self.task.number(move.angle, here))
         unknown = move.angle is not None and math.isnan(angle)
         why = ANGLE if unknown else NO_REASON
         if move.via is not None:
-            goal = reader.goal(move.via)
+            goal = self._read(move, move.via, there)
             yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
-        goal = reader.goal(move.to)
+        goal = self._read(move, move.to, there)
         if why:
             goal = not_reached(goal, ANGLE)
         yield KrlVisit(
@@ -144,9 +144,26 @@ class KrlGoals:
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
-    def _reader(self, move: said.KrlMove, here: Scope) -> KrlGoal:
-        within = self.block(here) is not None
-        return KrlGoal(self.task, here, move, within, self.aux)
+    def reader(self, here: Scope) -> KrlGoal:
+        """Return what reads the points that a statement names."""
+        return KrlGoal(self.task, here, self.aux)
+
+    def _read(
+        self, move: said.KrlMove, operand: ir.Operand | None, here: Scope
+    ) -> FoundGoal:
+        """Read where a move goes: on from where the arm is, or to a point.
+
+        On an arc or in a spline block the arm is where the arc or the block begins.
+        """
+        reader, by_joints = self.reader(here), motion_of(move.word) == Motion.JOINT
+        if move.word.endswith("_rel"):
+            return reader.read_step(operand, move)
+        alone = move.via is None and self.block(here) is None
+        if alone and isinstance(operand, ir.DataObject) and operand.name in PRESENT:
+            step = Meaning.BY if by_joints else Meaning.RELATIVE_UFRAME
+            nowhere = (0.0,) * pose_encoding.WIDTH
+            return FoundGoal(step, nowhere, name=operand.name, why=STAYS)
+        return _reach(reader.goal(operand), by_joints, alone)
 
     def block(self, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
@@ -165,6 +182,35 @@ class KrlGoals:
             move = replace(move, words=(*move.words, *end.words))
         shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
         return move, shared
+
+
+def _reach(goal: FoundGoal, by_joints: bool, alone: bool) -> FoundGoal:
+    """Return where a move to a point leads, as far as that is followed.
+
+    Missing numbers are those of axes, or of X, Y, Z on a line: of A, B, C the others
+    cannot be told by where the arm is, and a joint move needs S and T.
+
+    Args:
+        goal: The point.
+        by_joints: The move is a PTP.
+        alone: It stands in no spline block, and is no arc.
+    """
+    why, target = NO_REASON, goal.target
+    in_axes = target == Meaning.HOME and not math.isnan(goal.values[0])
+    in_axes |= target in (Meaning.JOINTS, Meaning.PARTIAL_JOINTS)
+    if in_axes and not by_joints:
+        why = NOT_BY_JOINTS
+    elif target in (Meaning.PARTIAL_JOINTS, Meaning.PARTIAL_POSE):
+        why = NO_REASON if alone and in_axes == by_joints else PARTIAL
+    elif target == Meaning.POSE and by_joints:
+        why = NO_STATUS if pose_encoding.NOT_WRITTEN in goal.values[6:] else why
+        why = why or (ODD_STATUS if goal.why == ODD_STATUS else NO_REASON)
+    if not why:
+        return goal
+    if goal.slots[0] >= 0 or goal.point < 0:
+        return FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=why)
+    pins = goal.pins or f"{goal.name} is shifted without S and T"
+    return hold_numbers(goal, goal.name, why, pins)
 
 
 def motion_of(word: str) -> Motion:
@@ -195,35 +241,23 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
 
 @dataclass(frozen=True)
 class KrlGoal(goals.GoalReader):
-    """Reads the ends of one move.
+    """Reads points.
 
     Attributes:
-        move: The move.
-        in_block: It stands in a spline block.
         axes: External axes that the cell declares.
     """
 
     task: symbols.KrlTask
-    move: said.KrlMove
-    in_block: bool
     axes: Collection[int] = ()
     dialect = pose_encoding.KRL_DIALECT
     brackets = "[]"
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
 
-    @property
-    def _by_joints(self) -> bool:
-        return motion_of(self.move.word) == Motion.JOINT
-
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
-        """Read steps, home positions, where the arm is, and products of frames."""
-        if self.move.word.endswith("_rel"):
-            return self._step(operand)
+        """Read home positions, where the arm is, and products of frames."""
         match operand:
-            case ir.DataObject(name=name) if name in PRESENT:
-                return self._stay(operand)
-            case ir.DataObject(name=name) if name in BEFORE:
+            case ir.DataObject(name=name) if name in (*PRESENT, *BEFORE):
                 return self.unknown(no_target(goals.RUN_TIME), name)
             case ir.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
@@ -272,13 +306,11 @@ class KrlGoal(goals.GoalReader):
         """Return True unless an external axis that the cell declares is missing."""
         fields = dict(value.fields) if isinstance(value, KnownRecord) else {}
         lacks_axis = any(symbols.OUTSIDE[axis - 1] not in fields for axis in self.axes)
-        return held.operand is not None or not lacks_axis
+        return held.goal is not None or not lacks_axis
 
     def _axes(self, found: KnownRecord) -> FoundGoal:
-        """Read six joint angles; only PTP goes to them."""
+        """Read six joint angles."""
         numbers = _numbers(found, symbols.AXES)
-        if not self._by_joints:
-            return self.unknown(NOT_BY_JOINTS)
         if numbers is None:
             return self._partial(found, symbols.AXES, Meaning.PARTIAL_JOINTS)
         slots = goals.list_slots(numbers, pose_encoding.WIDTH)
@@ -304,10 +336,6 @@ class KrlGoal(goals.GoalReader):
         file = file_of(slots[0])
         own = tuple(one.slot if file_of(one.slot) == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
-        if self._by_joints and pose_encoding.NOT_WRITTEN in values[6:]:
-            return self.unknown(NO_STATUS)
-        if self._by_joints and why.code is Code.CONFIGURATION_UNKNOWN:
-            return self.unknown(why)
         why = why or (NO_REASON if file >= 0 else goals.COMPUTED)
         return FoundGoal(
             Meaning.POSE, tuple(values), (*slots[:6], *own), NO_SLOTS, aux=aux, why=why
@@ -316,15 +344,9 @@ class KrlGoal(goals.GoalReader):
     def _partial(
         self, found: KnownRecord, names: Sequence[str], meaning: Meaning
     ) -> FoundGoal:
-        """Read numbers of which some are missing: they stay what they were before.
-
-        It is followed by axes, or by X, Y, Z on a line. Of A, B, C the others cannot be
-        told by where the arm is, and a joint move needs S and T.
-        """
+        """Read numbers of which some are missing: they stay what they were before."""
         given = {key for key, _ in found.fields}
-        moves_so = (meaning == Meaning.PARTIAL_JOINTS) == self._by_joints
-        alone = not self.in_block and self.move.via is None and bool(given & {*names})
-        if not (moves_so and alone and given <= {*names, *symbols.OUTSIDE}):
+        if not (given & {*names} and given <= {*names, *symbols.OUTSIDE}):
             return self.unknown(PARTIAL)
         values = [found.number(name) for name in names]
         values += [math.nan] * (pose_encoding.WIDTH - len(values))
@@ -348,19 +370,6 @@ class KrlGoal(goals.GoalReader):
             value if value != 0.0 or axis in self.axes else math.nan
             for axis, value in enumerate(values, start=1)
         )
-
-    def _stay(self, operand: ir.DataObject) -> FoundGoal:
-        """Read a move to where the arm is: a step of nothing.
-
-        On an arc or in a spline block that is where the arc or the block begins. What
-        data were given is where the arm was then.
-        """
-        name, given = operand.name, operand is not self.move.to
-        if given or self.in_block or self.move.via is not None:
-            return self.unknown(no_target(goals.RUN_TIME), name)
-        meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
-        why = no_target("it stays where it is")
-        return FoundGoal(meaning, (0.0,) * pose_encoding.WIDTH, name=name, why=why)
 
     def _home(self, operand: ir.DataObject) -> FoundGoal:
         """Read a home position: it holds no target of a process."""
@@ -392,13 +401,6 @@ class KrlGoal(goals.GoalReader):
         shift = FrameReader(self.task, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not shift.pose:
             return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
-        if behind and self._by_joints:
-            return replace(
-                base, target=Meaning.UNKNOWN, values=self.nothing, why=NO_STATUS,
-                slots=(-1,) * pose_encoding.WIDTH, follows=base.origin,
-                pins=base.pins or f"{base.name} is shifted without S and T",
-                holds=base.holds | own,
-            )  # fmt: skip
         by, slots = self._shift(base, other, shift, behind)
         base = replace(base, stays=base.stays or base.slots[0] < 0)
         aux = self._outside_of(base, other) if behind else base.aux
@@ -447,8 +449,9 @@ class KrlGoal(goals.GoalReader):
 
     # Steps.
 
-    def _step(self, operand: ir.Operand | None) -> FoundGoal:
+    def read_step(self, operand: ir.Operand | None, move: said.KrlMove) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
+        by_joints = motion_of(move.word) == Motion.JOINT
         found = self.task.value(operand, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
             found, KnownRecord
@@ -458,14 +461,14 @@ class KrlGoal(goals.GoalReader):
             return self.unknown(goals.AT_RUN_TIME)
         names = {key for key, _ in found.fields}
         values = {name: found.number(name) for name in names - {"s", "t"}}
-        if self._by_joints and names <= {*symbols.AXES, *symbols.OUTSIDE}:
+        if by_joints and names <= {*symbols.AXES, *symbols.OUTSIDE}:
             steps = tuple(values.get(name, 0.0) for name in symbols.AXES)
             return self._step_goal(Meaning.BY, (*steps, 0.0, 0.0), values)
         place = tuple(values.get(name, 0.0) for name in PLACE[:3])
         turned = any(values.get(name, 0.0) for name in PLACE[3:])
-        if self._by_joints or turned or self.move.via is not None:
+        if by_joints or turned or move.via is not None:
             return self.unknown(no_target("a step that is not followed"))
-        tool = "#tool" in self.move.words
+        tool = "#tool" in move.words
         meaning = Meaning.RELATIVE_TOOL if tool else Meaning.RELATIVE_UFRAME
         return self._step_goal(meaning, (*place, *(0.0,) * 5), values)
 

@@ -9,7 +9,7 @@ from collections.abc import Container, Mapping, Sequence
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
-from postproc.language.analysis.found_visits import FoundGoal, not_reached
+from postproc.language.analysis.found_goals import FoundGoal, not_reached
 from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.krl import modal_state
 from postproc.language.krl.interpreter import KrlMachine

@@ -15,11 +15,7 @@ from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import Points, Scope
 from postproc.language.analysis.conditions import compose_poses
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundVisit,
-    not_reached,
-)
+from postproc.language.analysis.found_goals import FoundGoal, not_reached
 from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
 from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
@@ -91,7 +87,7 @@ class FrameOfMove:
 
 
 @dataclass
-class RapidVisit(FoundVisit):
+class RapidVisit(goals.FoundVisit):
     r"""One arrival, as it is found.
 
     Attributes:
@@ -128,7 +124,7 @@ class Goals:
         there = replace(scope, points=points) if points.routines else scope
         tool, wobj, zone, speed = self._conditions(one, ends, there)
         motion = _motion(one.name, signature)
-        reader = RapidGoal(self.task, there, signature.joints, self._slots)
+        reader = self.reader(there)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
@@ -136,12 +132,18 @@ class Goals:
         why = why or untold
         for via in (True, False) if signature.via >= 0 else (False,):
             goal = reader.goal(ends[via])
+            if goal.target == (Meaning.POSE if signature.joints else Meaning.JOINTS):
+                goal = reader.unknown(goals.AT_RUN_TIME, goal.name)
             if not (via or signature.reaches):
                 goal = not_reached(goal, why)
             yield RapidVisit(
                 scope, motion, via, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
+
+    def reader(self, here: Scope) -> RapidGoal:
+        """Return what reads the points that a statement names."""
+        return RapidGoal(self.task, here, self._slots)
 
     def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
         """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
@@ -227,8 +229,7 @@ class Goals:
         found = self.task.value(operand, arguments.scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            there = RapidGoal(self.task, arguments.scope, False, self._slots)
-            why = there.explain_unknown(name)
+            why = self.reader(arguments.scope).explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
             return FrameOfMove((), kind == "tool", why)
@@ -241,15 +242,13 @@ FLANGE = FrameOfMove(IDENTITY, True)
 
 @dataclass(frozen=True)
 class RapidGoal(goals.GoalReader):
-    """Reads the ends of one move.
+    """Reads points.
 
     Attributes:
-        joints: They are jointtargets.
         slots: Of points that are written in moves, by the identity of these.
     """
 
     task: RapidTask
-    joints: bool
     slots: dict[int, tuple[ir.Composite, list[int]]]
     dialect = RAPID_DIALECT
     brackets = "{}"
@@ -257,12 +256,11 @@ class RapidGoal(goals.GoalReader):
 
     def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
         """Take a robtarget or jointtarget apart."""
-        counts = _COUNTS[self.joints]
-        if not isinstance(value, tuple) or len(value) != len(counts):
+        if not isinstance(value, tuple):
             return None
         parts = [[*list_leaves(part)] for part in value]
         own = [[x for x in part if isinstance(x, WrittenNumber)] for part in parts]
-        if own != parts or tuple(map(len, own)) != counts:
+        if own != parts or tuple(map(len, own)) not in _COUNTS:
             return None
         numbers = [one for part in own[:-1] for one in part]
         slots = goals.list_slots(numbers, WIDTH)
@@ -273,9 +271,10 @@ class RapidGoal(goals.GoalReader):
     def _goal_of(self, numbers: list[float], outside: list[float]) -> FoundGoal:
         """Return where numbers and external axes lead."""
         values = numbers + [0.0] * (WIDTH - len(numbers))
-        known = self.joints or _is_unit(values[3:7])
+        joints = len(numbers) < WIDTH
+        known = joints or _is_unit(values[3:7])
         return FoundGoal(
-            Meaning.JOINTS if self.joints else Meaning.POSE, tuple(values),
+            Meaning.JOINTS if joints else Meaning.POSE, tuple(values),
             aux=tuple(np.nan if abs(value) > UNUSED else value for value in outside),
             why=NO_REASON if known else _NO_QUATERNION,
         )  # fmt: skip
@@ -301,12 +300,12 @@ class RapidGoal(goals.GoalReader):
         """Read a point that is written in numbers alone, None for any other."""
         if id(written) not in self.slots:
             self.slots[id(written)] = written, _plain_slots(written)
-        slots, count = self.slots[id(written)][1], 6 if self.joints else 11
-        if len(slots) != count + 6:
+        slots = self.slots[id(written)][1]
+        if not slots:
             return None
         text = self.task.files[file].text
         at = [int(text.first[row]) + slot for slot in slots]
-        values = text.value[at].tolist()
+        values, count = text.value[at].tolist(), len(slots) - 6
         found = self._goal_of(values[:count], values[count:])
         if not np.isfinite(values).all() or found.why:
             return None
@@ -318,7 +317,7 @@ class RapidGoal(goals.GoalReader):
         """Read Offs and RelTool: the point is moved along."""
         if not isinstance(operand, ir.FunctionCall) or operand.name not in SHIFTS:
             return None
-        if operand.name in self.task.routines or self.joints:
+        if operand.name in self.task.routines:
             return None
         name, arguments = operand.name, operand.arguments
         by = self.task.read_shift(arguments, self.here)
@@ -326,7 +325,7 @@ class RapidGoal(goals.GoalReader):
             return self.unknown(goals.AT_RUN_TIME)
         turns = {one.name: one.value for one in arguments}
         placed = [one.value for one in arguments if not one.name]
-        base = replace(self, joints=False).goal(placed[0])
+        base = self.goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
         first = int(self.task.files[self.here.file].text.first[self.here.row])
         first += self.task.first_slots[self.here.file]

@@ -11,6 +11,7 @@ from postproc.language.analysis.assigned_points import (
     Component,
     Scope,
 )
+from postproc.language.analysis.values import WrittenNumber
 from postproc.language.visits import Meaning
 from tests.language.krl.test_visits import DATA, job
 from tests.language.rapid.test_visits import L, task
@@ -19,7 +20,7 @@ HERE = Scope(0, "m", "main")
 
 
 def point(name, index=(), row=0):
-    return AssignedPoint((0, "m", "", name), None, HERE.at(row), index)
+    return AssignedPoint((0, "m", "", name), index, WrittenNumber(float(row)))
 
 
 def test_an_element_is_forgotten_alone_or_with_its_array():
