@@ -216,13 +216,15 @@ class GoalReader(ABC):
         if file < 0:
             return False
         first, behind = self.task.files[file].text.first[row : row + 2].tolist()
-        begin = self.task.first_slots[file]
+        begin = self.task.numbering.first[file]
         own = range(begin + first, begin + behind)
         return all(slot in own for slot in goal.slots if slot >= 0)
 
     def is_of_system(self, slot: int) -> bool:
         """Return True if a number stands in a file that is read and not rewritten."""
-        return slot >= 0 and self.task.files[self.task.file_of(slot)].is_system
+        return (
+            slot >= 0 and self.task.files[self.task.numbering.file_of(slot)].is_system
+        )
 
     def _index(self, step: str | ir.ElementStep) -> tuple[int, ...] | None:
         return self.task.index(step, self.here)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -42,6 +40,7 @@ from postproc.language.analysis.values import (
     take_apart,
     without_places,
 )
+from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
@@ -287,13 +286,9 @@ class TaskSymbols(ABC, Generic[F]):
         return found
 
     @cached_property
-    def first_slots(self) -> Sequence[int]:
-        """The index of every file's first number among those of the job."""
-        return [0, *accumulate(len(file.text.numbers) for file in self.files)]
-
-    def file_of(self, slot: int) -> int:
-        """Return the file that a number stands in, -1 for none."""
-        return bisect_right(self.first_slots, slot) - 1
+    def numbering(self) -> Numbering:
+        """The statements and numbers of all files, those beside the task the last."""
+        return Numbering([one.text for one in (*self.files, *self.files_beside)])
 
     @cached_property
     def declared(self) -> frozenset[str]:
@@ -545,7 +540,7 @@ class TaskSymbols(ABC, Generic[F]):
             case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 at = int(text.first[here.row]) + slot
-                own = self.first_slots[here.file] + at
+                own = self.numbering.first[here.file] + at
                 return _make_number(float(text.value[at]), own)
             case ir.StringLiteral(text=written):
                 return written

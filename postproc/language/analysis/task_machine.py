@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -187,10 +186,10 @@ class TaskMachine(Interpreter[Arrived]):
             operand
         )
 
-    @cached_property
-    def texts(self) -> Sequence[StatementText[Any]]:
+    @property
+    def texts(self) -> Sequence[Any]:
         """The statements of all files, the main one first."""
-        return [file.text for file in (*self.task.files, *self.task.files_beside)]
+        return self.task.numbering.texts
 
     # What a language says.
 
@@ -524,8 +523,8 @@ class TaskMachine(Interpreter[Arrived]):
             caller: Where the call stands, None where nothing calls it.
             here: How the arm comes to it.
         """
-        file, module, routine = found
-        at = self.offsets[file] + routine.first if caller is None else caller.job_row
+        (file, module, routine), rows = found, self.task.numbering.rows
+        at = rows[file] + routine.first if caller is None else caller.job_row
         around = self.root if caller is None else caller.context
         context = around.find(at, CALLED)
         if context is None:
@@ -550,7 +549,8 @@ class TaskMachine(Interpreter[Arrived]):
         if caller and (call := self._call_of(found, caller)) is not None:
             scope = self._bind(found, call, scope_at(caller))
         scope = scope or self.task.scope_of(found)
-        return TaskPlace(scope, found, self._flows[key], text, self.offsets[file])
+        first = self.task.numbering.rows[file]
+        return TaskPlace(scope, found, self._flows[key], text, first)
 
     def _bind(
         self, routine: TaskRoutine, call: ir.Instruction, there: Scope
@@ -599,11 +599,6 @@ class TaskMachine(Interpreter[Arrived]):
             found = bool(routine.rows.head.parameters) and own in called
             self._recursive[routine.key] = found
         return self._recursive[routine.key]
-
-    @cached_property
-    def offsets(self) -> Sequence[int]:
-        """The job-wide index of the first row of every file."""
-        return [0, *accumulate(len(text) + 1 for text in self.texts)]
 
     def arrive(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Record the visits of a move; the arm then stands at the last.

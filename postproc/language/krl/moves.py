@@ -290,7 +290,8 @@ class KrlGoal(goals.GoalReader):
     def explain_pinned(self, name: str, slot: int) -> str:
         """Say why a point must keep its numbers."""
         if self.is_of_system(slot):
-            place = self.task.files[self.task.file_of(slot)].text.source.name
+            numbering = self.task.numbering
+            place = numbering.names[numbering.file_of(slot)]
             return f"{name} stands in {place}, which all programs share"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
@@ -332,7 +333,7 @@ class KrlGoal(goals.GoalReader):
         ]
         values = [one.value for one in (*numbers, *written)]
         slots = goals.list_slots(numbers, pose_encoding.WIDTH)
-        file_of = self.task.file_of
+        file_of = self.task.numbering.file_of
         file = file_of(slots[0])
         own = tuple(one.slot if file_of(one.slot) == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
@@ -414,7 +415,8 @@ class KrlGoal(goals.GoalReader):
         value = self.task.value(other, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
         first = goals.list_slots(numbers or (), pose_encoding.WIDTH)[0]
-        return frozenset([first] if self.task.file_of(first) == self.here.file else [])
+        own = self.task.numbering.file_of(first) == self.here.file
+        return frozenset([first] if own else [])
 
     def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
@@ -444,7 +446,7 @@ class KrlGoal(goals.GoalReader):
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = numbers if isinstance(other, said.KrlAggregate) else None
         slots = goals.list_slots(written or (), pose_encoding.WIDTH)
-        files = {self.task.file_of(one.slot) for one in written or ()}
+        files = {self.task.numbering.file_of(one.slot) for one in written or ()}
         return shift, slots if files == {self.here.file} else NO_SLOTS
 
     # Steps.

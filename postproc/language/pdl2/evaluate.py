@@ -264,8 +264,7 @@ class Execution:
         match expression:
             case ir.Num(slot):
                 lines = self.place.program.lines
-                base = self.world.slot_base[lines.source.name]
-                at = int(base + lines.first[self.row] + slot)
+                at = int(self.place.first + lines.first[self.row] + slot)
                 return self._with_slot(expression, at)
             case ir.Operation("()", (operand,)):
                 return self.read_number(operand)

@@ -309,7 +309,7 @@ class RapidGoal(goals.GoalReader):
         found = self._goal_of(values[:count], values[count:])
         if not np.isfinite(values).all() or found.why:
             return None
-        begin = self.task.first_slots[file]
+        begin = self.task.numbering.first[file]
         own = [begin + slot for slot in at[:count]]
         return replace(found, slots=(*own, *(-1,) * (WIDTH - count)))
 
@@ -328,7 +328,7 @@ class RapidGoal(goals.GoalReader):
         base = self.goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
         first = int(self.task.files[self.here.file].text.first[self.here.row])
-        first += self.task.first_slots[self.here.file]
+        first += self.task.numbering.first[self.here.file]
         slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
         own = frozenset(slots[:1] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"

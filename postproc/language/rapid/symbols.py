@@ -135,9 +135,9 @@ class RapidTask(TaskSymbols[RapidFile]):
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
             return False
-        file = self.file_of(one.slot)
+        file = self.numbering.file_of(one.slot)
         text = self.files[file].text
-        row = text.row_of(one.slot - self.first_slots[file])
+        row = text.row_of(one.slot - self.numbering.first[file])
         return not self.taught_lines[file].isdisjoint(text.lines(row))
 
     # What other tasks do: global persistents of one name are the same data.
