@@ -762,11 +762,14 @@ class TaskSymbols(ABC, Generic[F]):
             return known.copy_to(place, index, own)
         wholes = map(_without_components, ir.data_in(value))
         inside = [held for one in wholes if (held := self.find_held(one, here))]
-        names = self.names_of(value).union(own, *(point.names for point in inside))
-        plain = replace(here, points=NO_POINTS)
+        plain, names = replace(here, points=NO_POINTS), self.names_of(value)
+        given = [name for name, _, _ in here.given]
+        quick = not (inside or self.calls_routine(value)) and names.isdisjoint(given)
+        steady = quick or self.value(value, here) == self.value(value, plain)
+        names = names.union(own, *(point.names for point in inside))
         if part.component:
             point = here.points.held.get((place, index)) or AssignedPoint(place, index)
-        elif self.value(value, here) == self.value(value, plain):
+        elif steady:
             return self._give_whole(part, index, value, plain).copy_to(
                 place, index, names
             )
