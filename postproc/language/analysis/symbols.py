@@ -59,7 +59,6 @@ class TaskSymbols(ABC, Generic[F]):
         layouts: Components of data by type.
         followed: Types of data whose assignments are followed.
         targets: Those of them whose numbers a move may have written anew.
-        constants: Names that the language gives values to.
         functions: Kinds of routines that return values.
         by_name: Records hold their components by name, not by their order.
         uncertain: Operators whose result kinds of numbers, or controllers, decide.
@@ -75,7 +74,6 @@ class TaskSymbols(ABC, Generic[F]):
     layouts: ClassVar[Mapping[str, Layout]]
     followed: ClassVar[Collection[str]]
     targets: ClassVar[Collection[str]]
-    constants: ClassVar[Mapping[str, float]] = {}
     functions: ClassVar[str]
     by_name: ClassVar[bool] = False
     uncertain: ClassVar[Collection[str]] = ("DIV", "MOD")
@@ -158,6 +156,11 @@ class TaskSymbols(ABC, Generic[F]):
     def unit(self, file: int) -> int:
         """Return the file that stands for all that a file shares its names with."""
         return file
+
+    def controller_data(self, name: str) -> tuple[Value, str] | None:
+        """Return what the controller gives a name, and its type; None for others."""
+        truth = {"true": 1.0, "false": 0.0}.get(name)
+        return None if truth is None else (WrittenNumber(truth), "")
 
     def apply(self, call: ir.FunctionCall, here: Scope, depth: int) -> Value | None:
         """Return what a function of the controller gives, None where not known."""
@@ -516,7 +519,7 @@ class TaskSymbols(ABC, Generic[F]):
         place = self.place(name, here)
         found = self.datum(name, here)
         if found is None:
-            fixed = name in ALIKE or name in self.constants
+            fixed = name in ALIKE or self.controller_data(name) is not None
             return False if place is None and fixed else None
         return False if found[1].kind == "const" else None
 
@@ -590,8 +593,9 @@ class TaskSymbols(ABC, Generic[F]):
             return value, steps[len(whole.steps) :], self.type_of(held.place)
         for _, operand, there in self.find_given(ir.DataObject(name), here):
             return self.value(operand, there, depth + 1), steps, ""
-        if not steps and self.place(name, here) is None and name in self.constants:
-            return WrittenNumber(self.constants[name]), steps, ""
+        own = name in self.declared or name in here.parameters
+        if not own and (given := self.controller_data(name)):
+            return given[0], steps, given[1]
         found = None
         if self.apart and steps and isinstance(steps[0], ir.ElementStep):
             index = self.index(steps[0], here)

@@ -16,7 +16,12 @@ from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import Points, Scope
 from postproc.language.analysis.conditions import compose_poses
 from postproc.language.analysis.found_goals import FoundGoal, not_reached
-from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
+from postproc.language.analysis.values import (
+    Value,
+    WrittenNumber,
+    list_leaves,
+    number_in,
+)
 from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT, WIDTH
@@ -26,13 +31,10 @@ from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
 UNUSED = 1e8  # values of external axes from here on (9E9) say that there is none
-_ZONE = re.compile(r"z(\d+)$")
-_SPEED = re.compile(r"v(\d+)$")
 _STEM = re.compile(
     r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
 )
 SHORTEST = 0.5  # length of what counts as a quaternion
-Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
 UNKNOWN_ZONE = -1.0
 # Options whose moves are left.
@@ -150,10 +152,6 @@ class Goals:
 
         ``load0`` and other loads up to a hundredth of a kilogram are no load.
         """
-        operand, scope = self.task.behind(operand, scope)
-        if isinstance(operand, ir.DataObject) and operand.name == "load0":
-            if not operand.steps and "load0" not in self.task.declared:
-                return EMPTY_HAND
         found = load_of(self.task.value(operand, scope))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
@@ -177,10 +175,7 @@ class Goals:
         Moves that only name them, and name the same, have the same.
         """
         own = [a for a in one.arguments if all(a.value is not e for e in ends)]
-        named = all(
-            value is None or (isinstance(value, ir.DataObject) and not value.steps)
-            for value in (a.value for a in own)
-        ) and not any(self._is_assigned(a.value) for a in own)
+        named = all(a.value is None or self._is_fixed(a.value) for a in own)
         stops = one.name in AT_A_STOP
         key = stops, *own, *scope.place, scope.loops, scope.given
         if named and key in self._known:
@@ -188,11 +183,11 @@ class Goals:
         arguments = _Arguments(self.task, one.arguments, scope)
         zone = np.nan if stops else arguments.zone()
         operand = arguments.option("wobj")
-        wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
+        wobj = WORLD if operand is None else self._frame("wobj", operand, scope)
         operand = arguments.of_type("tooldata")
         tool = FrameOfMove((), True, _NO_TOOL)
         if operand is not None:
-            tool = self._frame("tool", operand, arguments)
+            tool = self._frame("tool", operand, scope)
         found = tool, wobj, zone, arguments.speed()
         if named:
             self._known[key] = found
@@ -200,44 +195,35 @@ class Goals:
 
     # Tools and work objects.
 
-    def _is_assigned(self, operand: ir.Operand | None) -> bool:
-        """Return True if the program may give data another value on its way."""
-        return isinstance(operand, ir.DataObject) and operand.name in self.task.written
-
-    def _frame(
-        self, kind: str, operand: ir.Operand, arguments: _Arguments
-    ) -> FrameOfMove:
+    def _frame(self, kind: str, operand: ir.Operand, scope: Scope) -> FrameOfMove:
         """Read a tool or a work object, by name once for each place it may mean."""
-        found, scope = self.task.behind(operand, arguments.scope)
-        operand = operand if found is None else found
-        arguments = replace(arguments, scope=scope)
-        if isinstance(operand, ir.DataObject) and not operand.steps:
-            if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
-                return FLANGE if kind == "tool" else WORLD
-            key = kind, operand.name, *scope.place
-            if self._is_assigned(operand):
-                return self._read_frame(kind, operand, arguments)
-            if key not in self._frames:
-                self._frames[key] = self._read_frame(kind, operand, arguments)
+        named, scope = self.task.behind(operand, scope)
+        key, fixed = (kind, named, *scope.place), self._is_fixed(named)
+        if fixed and key in self._frames:
             return self._frames[key]
-        return self._read_frame(kind, operand, arguments)
-
-    def _read_frame(
-        self, kind: str, operand: ir.Operand, arguments: _Arguments
-    ) -> FrameOfMove:
-        name = operand.name if isinstance(operand, ir.DataObject) else f"the {kind}"
-        found = self.task.value(operand, arguments.scope)
+        name = named.name if isinstance(named, ir.DataObject) else f"the {kind}"
+        found = self.task.value(named, scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            why = self.reader(arguments.scope).explain_unknown(name)
+            why = self.reader(scope).explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
-            return FrameOfMove((), kind == "tool", why)
-        return replace(read, taught=self.task.is_taught(name, found))
+            read = FrameOfMove((), kind == "tool", why)
+        else:
+            read = replace(read, taught=self.task.is_taught(name, found))
+        if fixed:
+            self._frames[key] = read
+        return read
+
+    def _is_fixed(self, operand: ir.Operand | None) -> bool:
+        """Return True if an operand is data by name that nothing changes."""
+        match operand:
+            case ir.DataObject(name=name, steps=()):
+                return name not in self.task.written
+        return False
 
 
 WORLD = FrameOfMove(IDENTITY, False)
-FLANGE = FrameOfMove(IDENTITY, True)
 
 
 @dataclass(frozen=True)
@@ -414,64 +400,32 @@ class _Arguments:
         if not isinstance(operand, ir.DataObject):
             return ""
         found = self.task.datum(operand.name, scope)
-        if found is not None:
-            return found[1].type
-        if operand.name == "tool0":
-            return "tooldata"
-        if operand.name == "fine" or _ZONE.match(operand.name):
-            return "zonedata"
-        return "speeddata" if _SPEED.match(operand.name) else ""
+        given = self.task.controller_data(operand.name) or (None, "")
+        return given[1] if found is None else found[1].type
 
-    def _find_argument(self, type_: str) -> tuple[ir.DataObject | None, _Arguments]:
-        """Return the only argument of a type, and the arguments where it stands."""
-        found = self.task.behind(self.of_type(type_), self.scope)
-        named = found[0] if isinstance(found[0], ir.DataObject) else None
-        return named, replace(self, scope=found[1])
-
-    def is_built_in(self, name: str) -> bool:
-        """Tell whether a name is the controller's: no data, no parameter has it."""
-        hidden = name in self.task.declared or name in self.scope.parameters
-        return not (hidden or self.task.place(name, self.scope))
+    def _numbers(self, type_: str) -> list[float]:
+        """Return the first two numbers of the only argument of a type, NaN for none."""
+        found = self.task.value(self.of_type(type_), self.scope)
+        return [number_in(one) for one in (*list_leaves(found), None, None)][:2]
 
     def zone(self) -> float:
         """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
         if any(one.name == "inpos" for one in self.arguments):
             return np.nan  # stop-point data stand instead of the zone
-        size = self.option("z")
-        operand, there = self._find_argument("zonedata")
+        size, (stops, tcp) = self.option("z"), self._numbers("zonedata")
         if size is not None:
-            fine = operand is not None and operand.name == "fine"
             own = self.task.number(size, self.scope)
-            return own if own >= 0.0 and not fine else UNKNOWN_ZONE
-        if operand is None:
+            return own if own >= 0.0 and stops != 1.0 else UNKNOWN_ZONE
+        if np.isnan(stops + tcp):
             return UNKNOWN_ZONE
-        if operand.name == "fine":
-            return np.nan
-        usual = _ZONE.match(operand.name)
-        if usual and there.is_built_in(operand.name):
-            return float(usual[1]) or Z0
-        found = self.task.value(operand, there.scope)
-        if isinstance(found, tuple) and len(found) >= 2:
-            stops, tcp = found[:2]
-            if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
-                return np.nan if stops.value else tcp.value
-        return UNKNOWN_ZONE
+        return np.nan if stops else tcp
 
     def speed(self) -> float:
         """Return the speed along a path [m/s], NaN where it is not known."""
         own = self.option("v")
         if own is not None:
             return self.task.number(own, self.scope) / 1000.0
-        operand, there = self._find_argument("speeddata")
-        if operand is None:
-            return np.nan
-        usual = _SPEED.match(operand.name)
-        if usual and there.is_built_in(operand.name):
-            return float(usual[1]) / 1000.0
-        found = self.task.value(operand, there.scope)
-        if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
-            return found[0].value / 1000.0
-        return np.nan
+        return self._numbers("speeddata")[0] / 1000.0
 
 
 @cache
