@@ -179,36 +179,9 @@ _PARTS: Mapping[str, Mapping[str, str]] = {
     "$vel": {"cp": "speed"}, "$apo": {"cdis": "distance", "cptp": "overlap"},
 }  # fmt: skip
 """Variables that are set to numbers: components, and the modes that they are."""
-# System variables that change nothing of where targets are and from which side they are
-# reached; those in the first list do not stop what is planned ahead either.
-PLANNED = frozenset(
-    """
-    $vel $vel_axis $vel_extax $acc $acc_axis $acc_extax $jerk $apo $ori_type $circ_type
-    $circ_mode $ipo_mode $tool $base $load $advance $bwdstart $gear_jerk $act_tool
-    $act_base $act_tool_c $act_base_c $collmon_tol_pro $act_ex_ax $h_pos $ov_pro
-    $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
-    $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
-    $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
-    $deactivate_abs_accur $suppress_abs_accur $out_c
-    """.split()
-)
-_SETTING = frozenset(
-    """
-    $load $ipo_mode $ori_type $circ_mode $tech $tech_c $load_a1 $load_a2 $load_a3 $world
-    $nullframe
-    """.split()
-)  # of those that are planned, what targets are left for where its value is not known
+PLANNED, _SETTING = symbols.NAMES["planned"], symbols.NAMES["setting"]
 HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
-HARMLESS = frozenset(
-    """
-    $timer $timer_stop $timer_flag $flag $cycflag $loop_msg $loop_cont $msg_t $data_ok
-    $err $stopmess $mode_op $pro_state $pro_mode $pro_ip $pal_mode $notaus $user_saf
-    $alarm_stop $interpreter $date $rob_timer $techpar $techval $cmd $home_pos
-    $in_home $axis_home $pos_ret $axis_ret $pos_int $axis_int $pos_for $axis_for
-    $pos_back $axis_back $pos_act_mes $dist_next $motion $tsys $distance $vel_act
-    $torque_axis_act $curr_act $serv_off $move_enable $accu_state $outc
-    """.split()
-)
+HARMLESS = symbols.NAMES["harmless"]
 
 
 SUBMIT = "a submit program may set {} at any time"

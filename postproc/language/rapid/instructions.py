@@ -8,8 +8,10 @@ from functools import cache
 from pathlib import Path
 
 from postproc.language.ir import Argument, Operand
+from postproc.language.text.symbol_column import read_kinds
 
-INSTRUCTIONS = Path(__file__).parent / "instructions.txt"
+NAMES = read_kinds(Path(__file__).with_name("instructions.txt"))
+"""Names of instructions and functions by what they do."""
 
 
 @dataclass(frozen=True)
@@ -86,60 +88,20 @@ def read_known_instructions() -> Mapping[str, str]:
     >>> read_known_instructions()["tpwrite"], read_known_instructions()["pdispon"]
     ('still', 'modal')
     """
-    found: dict[str, str] = {}
-    for line in INSTRUCTIONS.read_text(encoding="utf-8").splitlines():
-        kind, _, names = line.partition(":")
-        if not line.startswith("#"):
-            found |= dict.fromkeys(names.lower().split(), kind)
-    return found
+    return {name: kind for kind in ("still", "modal", "left") for name in NAMES[kind]}
 
 
-READING = frozenset(
-    """
-    tperase tpwrite uimsgwrite set reset setdo setgo setao setdosync pulsedo invertdo
-    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob errlog errwrite
-    confj confl singarea cirpathmode accset velset speedrefresh worldacclim pathacclim
-    motionsup pdispon pdispset pdispoff eoffson eoffsset eoffsoff gripload
-    mechunitload actunit deactunit softact softdeact stopmove startmove
-    corrcon corrdiscon write open close isleep iwatch idelete
-    """.split()
-)
-"""Instructions that change none of the data that they are given, but by `ANSWERS`."""
+READING, WAITING = NAMES["reading"], NAMES["waiting"]
 
 ANSWERS = frozenset(
     ["timeflag", "valueattimeout", "taskno", "mectaskno", "errornumber"]
 )
 """Options that instructions and functions answer in."""
 
-BUILT_IN_FUNCTIONS = frozenset(
-    """
-    abs acos asin atan atan2 cos sin tan exp pow round sqrt trunc dim
-    offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
-    defframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
-    calcjointt numtostr strlen strpart valtostr ctime cdate clkread gettime
-    ainput aoutput dinput doutput ginput ginputdnum goutput goutputdnum testdi
-    valid present ispers isvar opmode runmode execlevel
-    isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
-    stringmatch strfind strmap strmatch strorder gettaskname robos
-    """.split()
-)
-"""Functions that neither move nor change what they are given, but by `ANSWERS`."""
+BUILT_IN_FUNCTIONS = NAMES["function"]
 
 STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
 """Functions that do not move."""
-
-WAITING = frozenset(
-    """
-    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob waitsynctask
-    waittestandset waitload stop break systemstopaction stopmove
-    tpreadfk tpreadnum tpreaddnum uimsgbox uimessagebox uilistview uinumentry
-    uidnumentry uinumtune uidnumtune uialphaentry
-    socketaccept socketconnect socketreceive socketreceivefrom rmqreadwait rmqsendwait
-    camgetresult camloadjob camwaitloadjob stclose stopen stcalib openhighlift
-    closehighlift readstr readnum readbin readrawbytes readanybin readstrbin
-    """.split()
-)
-"""What may take so long that the arm stops at a point with a zone before it."""
 
 SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
 BY_NAME = "callbyvar"
