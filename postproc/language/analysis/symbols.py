@@ -25,13 +25,15 @@ from postproc.language.analysis.assigned_points import (
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
 from postproc.language.analysis.found_goals import FoundGoal
-from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
+    ALIKE,
     KnownRecord,
     Layout,
     Value,
     WrittenNumber,
+    apply_function,
+    apply_operator,
     is_written,
     number_in,
     put_together,
