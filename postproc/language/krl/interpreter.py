@@ -12,7 +12,7 @@ from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
-from postproc.language.analysis.conditions import cell_pose
+from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
@@ -23,7 +23,6 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modal_state import (
     HALTING,
     HARMLESS,
@@ -547,9 +546,9 @@ def _is_modal(name: str) -> bool:
     return own or (name.startswith("$") and name not in HALTING | HARMLESS)
 
 
-def _frame(record: tuple[float, ...] | None) -> KrlFrame:
+def _frame(record: tuple[float, ...] | None) -> TaskFrame:
     """Take a frame over from the cell."""
-    return KrlFrame(() if record is None else cell_pose(record))
+    return TaskFrame(() if record is None else cell_pose(record))
 
 
 def _halt(here: Arrived, halted: bool | None) -> Arrived:

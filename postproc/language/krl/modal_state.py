@@ -11,7 +11,7 @@ from typing import Any
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
-from postproc.language.analysis.modal_state import ModalState
+from postproc.language.analysis.conditions import ModalState, TaskFrame
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord
 from postproc.language.krl import symbols
@@ -20,7 +20,6 @@ from postproc.language.krl.frames import (
     NUMBERS,
     ZERO,
     FrameReader,
-    KrlFrame,
     no_frame,
     set_component,
 )
@@ -67,8 +66,8 @@ class KrlModes(ModalState):
     """
 
     collected = ("declared", "active", "blocked")
-    tool: KrlFrame
-    base: KrlFrame
+    tool: TaskFrame
+    base: TaskFrame
     interpolation: str = "#base"
     speed: float = UNKNOWN
     share: float = UNKNOWN
@@ -291,7 +290,7 @@ class ModeReader:
         which = one.target.name[1:]
         if one.target.steps:
             new = self._component(getattr(modes, which), one.target.steps, one.value)
-            if isinstance(new, KrlFrame):
+            if isinstance(new, TaskFrame):
                 return modes.with_(**{which: new})
             why = f"a component of {one.target.name.upper()} is set by the program"
             return modes.with_(**{which: no_frame(why)})
@@ -317,13 +316,13 @@ class ModeReader:
             value = self._entry_value(modes, one)
         elif table != "load_data":
             value = self._component(modes.store.get(key), parts, one.value)
-        if isinstance(value, KrlFrame) and table in self.task.taught:
+        if isinstance(value, TaskFrame) and table in self.task.taught:
             value = replace(value, taught=True)
         return modes.hold(key, value)
 
     def _component(
         self, held: object, parts: Sequence[str | ir.ElementStep], value: ir.Operand
-    ) -> KrlFrame | KnownRecord | None:
+    ) -> TaskFrame | KnownRecord | None:
         """Set a component of a frame, None where what it then is is not known."""
         if len(parts) != 1 or not isinstance(parts[0], str):
             return None

@@ -14,12 +14,13 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import AssignedPoint, Points, Scope
+from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.found_goals import FoundGoal, hold_numbers, not_reached
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
+from postproc.language.krl.frames import FrameReader, no_frame, six_numbers
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -432,7 +433,7 @@ class KrlGoal(goals.GoalReader):
         return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
 
     def _shift(
-        self, base: FoundGoal, other: ir.Operand, frame: KrlFrame, behind: bool
+        self, base: FoundGoal, other: ir.Operand, frame: TaskFrame, behind: bool
     ) -> tuple[Shift, tuple[int, ...]]:
         """Say how a point is shifted, and where the numbers of that stand.
 

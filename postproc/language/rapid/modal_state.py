@@ -8,7 +8,7 @@ from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.modal_state import ModalState
+from postproc.language.analysis.conditions import ModalState
 from postproc.language.rapid.instructions import NAMES
 from postproc.language.visits import OrientationLaw, Switch
 

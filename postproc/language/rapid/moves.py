@@ -14,7 +14,7 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import Points, Scope
-from postproc.language.analysis.conditions import compose_poses
+from postproc.language.analysis.conditions import TaskFrame, compose_poses
 from postproc.language.analysis.found_goals import FoundGoal, not_reached
 from postproc.language.analysis.values import (
     Value,
@@ -67,40 +67,19 @@ _CARRIED = Reason(
 )
 
 
-@dataclass(frozen=True)
-class FrameOfMove:
-    """A tool or a work object.
-
-    Attributes:
-        pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
-            is not known.
-        held: Robhold: the arm holds it.
-        why: Why targets with it cannot be compensated.
-        taught: It was taught with the arm, and contains its error.
-        load: Of a tool: mass [kg] and its centre in the flange frame [mm]; empty where
-            the numbers are a placeholder, or not known.
-    """
-
-    pose: Pose
-    held: bool
-    why: Reason = NO_REASON
-    taught: bool = False
-    load: tuple[float, ...] = ()
-
-
 @dataclass
 class RapidVisit(goals.FoundVisit):
     r"""One arrival, as it is found.
 
     Attributes:
         tool, wobj: Its frames.
-        total: What ``\TLoad`` says that the arm carries in all, as `FrameOfMove.load`.
+        total: What ``\TLoad`` says that the arm carries in all, as `TaskFrame.load`.
         zone_mm: Size of its zone, NaN where it stops.
         speed: Along the path [m/s], NaN where not known.
     """
 
-    tool: FrameOfMove = field(kw_only=True)
-    wobj: FrameOfMove = field(kw_only=True)
+    tool: TaskFrame = field(kw_only=True)
+    wobj: TaskFrame = field(kw_only=True)
     zone_mm: float = field(kw_only=True)
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
@@ -111,9 +90,9 @@ class Goals:
     """Reads the arguments of moves; frames by name are read once."""
 
     task: RapidTask
-    _frames: dict[tuple[object, ...], FrameOfMove] = field(default_factory=dict)
-    _known: dict[tuple[object, ...], tuple[FrameOfMove, FrameOfMove, float, float]] = (
-        field(default_factory=dict)
+    _frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
+    _known: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = field(
+        default_factory=dict
     )
     _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
 
@@ -169,7 +148,7 @@ class Goals:
 
     def _conditions(
         self, one: ir.Instruction, ends: Sequence[ir.Operand | None], scope: Scope
-    ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
+    ) -> tuple[TaskFrame, TaskFrame, float, float]:
         """Read tool, work object, zone [mm] and speed [m/s] of a move.
 
         Moves that only name them, and name the same, have the same.
@@ -185,7 +164,7 @@ class Goals:
         operand = arguments.option("wobj")
         wobj = WORLD if operand is None else self._frame("wobj", operand, scope)
         operand = arguments.of_type("tooldata")
-        tool = FrameOfMove((), True, _NO_TOOL)
+        tool = TaskFrame((), _NO_TOOL)
         if operand is not None:
             tool = self._frame("tool", operand, scope)
         found = tool, wobj, zone, arguments.speed()
@@ -195,7 +174,7 @@ class Goals:
 
     # Tools and work objects.
 
-    def _frame(self, kind: str, operand: ir.Operand, scope: Scope) -> FrameOfMove:
+    def _frame(self, kind: str, operand: ir.Operand, scope: Scope) -> TaskFrame:
         """Read a tool or a work object, by name once for each place it may mean."""
         named, scope = self.task.behind(operand, scope)
         key, fixed = (kind, named, *scope.place), self._is_fixed(named)
@@ -208,7 +187,7 @@ class Goals:
             why = self.reader(scope).explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
-            read = FrameOfMove((), kind == "tool", why)
+            read = TaskFrame((), why)
         else:
             read = replace(read, taught=self.task.is_taught(name, found))
         if fixed:
@@ -223,7 +202,7 @@ class Goals:
         return False
 
 
-WORLD = FrameOfMove(IDENTITY, False)
+WORLD = TaskFrame(IDENTITY)
 
 
 @dataclass(frozen=True)
@@ -497,11 +476,11 @@ def pose_of(found: Value | None) -> tuple[float, ...]:
 
 
 def pose_of_numbers(numbers: Sequence[float]) -> Pose:
-    """Convert the seven numbers of a pose; see `FrameOfMove.pose`."""
+    """Convert the seven numbers of a pose; see `TaskFrame.pose`."""
     return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
 
 
-def _tool_of(found: Value | None) -> FrameOfMove | None:
+def _tool_of(found: Value | None) -> TaskFrame | None:
     """Read ``[robhold, [[x,y,z],[q1..q4]], [load]]``."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
@@ -510,7 +489,7 @@ def _tool_of(found: Value | None) -> FrameOfMove | None:
         return None
     load = load_of(found[2]) if len(found) > 2 else ()
     stated = load if load and load[0] > PLACEHOLDER else ()
-    return FrameOfMove(pose_of_numbers(pose), bool(held.value), load=stated)
+    return TaskFrame(pose_of_numbers(pose), remote=not held.value, load=stated)
 
 
 def load_of(found: Value | None) -> tuple[float, ...]:
@@ -525,7 +504,7 @@ def load_of(found: Value | None) -> tuple[float, ...]:
     return (mass.value, *at) if known else ()
 
 
-def _wobj_of(found: Value | None) -> FrameOfMove | None:
+def _wobj_of(found: Value | None) -> TaskFrame | None:
     """Read ``[robhold, ufprog, "ufmec", [uframe], [oframe]]``."""
     if not isinstance(found, tuple) or len(found) != 5:
         return None
@@ -539,4 +518,4 @@ def _wobj_of(found: Value | None) -> FrameOfMove | None:
     ):
         why = _CARRIED
     pose = compose_poses(pose_of_numbers(user), pose_of_numbers(object_))
-    return FrameOfMove(pose, bool(held.value), why)
+    return TaskFrame(pose, why, remote=bool(held.value))
