@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from postproc.language.analysis.assigned_points import (
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
-from postproc.language.analysis.found_goals import FoundGoal
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
     ALIKE,
@@ -43,6 +42,7 @@ from postproc.language.analysis.values import (
     without_places,
 )
 from postproc.language.analysis.visit_columns import Numbering
+from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
@@ -55,7 +55,7 @@ class TaskSymbols(ABC, Generic[F]):
 
     Attributes:
         files: Its files, the one that runs first.
-        taught: Lower-case names of data that were taught with the arm, by the cell.
+        start: What the cell says.
         files_beside: Files of tasks that run at the same time.
         comments: How the language writes them.
         layouts: Components of data by type.
@@ -66,11 +66,11 @@ class TaskSymbols(ABC, Generic[F]):
         uncertain: Operators whose result kinds of numbers, or controllers, decide.
         apart: Data may be declared in one place and get their first value elsewhere.
         volatile: Names of data that may change at any time, by what runs beside.
-        read_goal: Reads where a move to a point leads.
+        reader: Reads where moves lead, None where nothing is followed.
     """
 
     files: Sequence[F]
-    taught: Collection[str] = frozenset()
+    start: Start = field(default_factory=Start)
     files_beside: Sequence[F] = ()
     comments: ClassVar[Comments]
     layouts: ClassVar[Mapping[str, Layout]]
@@ -81,9 +81,7 @@ class TaskSymbols(ABC, Generic[F]):
     uncertain: ClassVar[Collection[str]] = ("DIV", "MOD")
     apart: ClassVar[bool] = False
     volatile: frozenset[str] = field(default=frozenset(), init=False)
-    read_goal: Callable[[ir.Operand, Scope], FoundGoal | None] = field(
-        default=lambda operand, here: None, init=False
-    )
+    reader: type[Any] | None = field(default=None, init=False)
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
         default_factory=lambda: defaultdict(dict), init=False
     )
@@ -796,8 +794,8 @@ class TaskSymbols(ABC, Generic[F]):
         base, goal, type_ = self.value(value, here), None, self.type_of(part.place)
         if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
             base = None
-        if value is not None and type_ in self.targets:
-            goal = self.read_goal(value, here)
+        if value is not None and self.reader and type_ in self.targets:
+            goal = self.reader(self, here).goal(value)
         return AssignedPoint(part.place, index, base, goal)
 
     def find_returned(

@@ -23,6 +23,7 @@ from postproc.language.analysis.control_flow import (
     is_structural,
 )
 from postproc.language.analysis.declarations import TaskRoutine
+from postproc.language.analysis.goals import GoalReader
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
     Interpreter,
@@ -37,7 +38,6 @@ from postproc.language.analysis.origins import (
     join_origins,
 )
 from postproc.language.analysis.symbols import TaskSymbols
-from postproc.language.language import Start
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
@@ -150,8 +150,8 @@ class TaskMachine(Interpreter[Arrived]):
         acting: Statements that move, call, or change what moves are made with; they
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
+        reader: Reads points.
         task: What its names mean.
-        start: What the cell says.
         diagnostics: What else was found.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
@@ -161,8 +161,8 @@ class TaskMachine(Interpreter[Arrived]):
     procedures: ClassVar[Collection[str]]
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
+    reader: ClassVar[type[GoalReader]]
     task: TaskSymbols[Any] = field(kw_only=True)
-    start: Start = field(kw_only=True)
     diagnostics: set[Diagnostic] = field(default_factory=set)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
@@ -182,9 +182,7 @@ class TaskMachine(Interpreter[Arrived]):
 
     def __post_init__(self) -> None:
         """Let assignments read where moves to points lead."""
-        self.task.read_goal = lambda operand, here: self.goals.reader(here).goal(
-            operand
-        )
+        self.task.reader = self.reader
 
     @property
     def texts(self) -> Sequence[Any]:
@@ -448,11 +446,11 @@ class TaskMachine(Interpreter[Arrived]):
 
     def declares_motionless(self, name: str) -> bool:
         """Tell whether the cell says that a routine neither moves nor sets frames."""
-        return self.start.effect_of(name) == "motionless"
+        return self.task.start.effect_of(name) == "motionless"
 
     def outside(self, at: At, name: str, here: Arrived) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
-        said_of_it = self.start.effect_of(name)
+        said_of_it = self.task.start.effect_of(name)
         if said_of_it in ("moves", "sets-frames"):
             self.lost |= here.origins
         if said_of_it == "moves":
@@ -817,14 +815,14 @@ def scope_at(at: At, here: Arrived | None = None) -> Scope:
     return scope
 
 
-def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
+def follow(kind: type[M], task: TaskSymbols[Any]) -> M:
     """Make a machine and run it.
 
     It runs again where data turn out to change in ways that are not followed.
     Where anything runs beside the program another one reads each move by itself: what
     runs beside may be one of several that were read at once.
     """
-    machine = kind(task=task, start=start)
+    machine = kind(task=task)
     task.volatile = machine.list_changed_beside()
     machine.run()
     while True:
@@ -834,6 +832,6 @@ def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
             break
         task.volatile |= changed
         at_once = machine.at_once and not machine.beside
-        machine = kind(task=task, start=start, at_once=at_once)
+        machine = kind(task=task, at_once=at_once)
         machine.run()
     return machine

@@ -388,7 +388,7 @@ class TaskCollector(Collector, ABC):
 
     def _find_taught(self) -> list[bool]:
         """Tell which go to taught points, or to targets shifted from one, (r,)."""
-        taught = self.machine.start.taught
+        taught = self.machine.task.start.taught
         if not (any(self.machine.task.taught_lines) or taught):
             return [False] * len(self.found)
         goals = [v.goal for v in self.found]

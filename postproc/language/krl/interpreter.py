@@ -30,7 +30,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals, own_numbers
+from postproc.language.krl.moves import KrlGoal, KrlGoals, own_numbers
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -86,6 +86,7 @@ class KrlMachine(TaskMachine):
     """
 
     procedures = ("def",)
+    reader = KrlGoal
     passed = (
         said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
     )  # fmt: skip
@@ -103,11 +104,13 @@ class KrlMachine(TaskMachine):
     @cached_property
     def goals(self) -> KrlGoals:
         """What reads destinations."""
-        return KrlGoals(self.task, frozenset(self.start.aux))
+        return KrlGoals(self.task)
 
     def run(self) -> None:
         """Follow every way from the first routine."""
-        modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
+        modes = KrlModes(
+            tool=_frame(self.task.start.tool), base=_frame(self.task.start.uframe)
+        )
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = self.begin(frozenset([START]), modes)
@@ -290,7 +293,7 @@ class KrlMachine(TaskMachine):
 
     def _is_overruled(self, name: str) -> bool:
         """Return True if the cell says what a routine of a package does."""
-        return self.start.assume_motion or name in self.start.routines
+        return self.task.start.assume_motion or name in self.task.start.routines
 
     def after_functions(
         self, at: At, one: ir.SourceStatement, here: Arrived

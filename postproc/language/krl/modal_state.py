@@ -316,7 +316,7 @@ class ModeReader:
             value = self._entry_value(modes, one)
         elif table != "load_data":
             value = self._component(modes.store.get(key), parts, one.value)
-        if isinstance(value, TaskFrame) and table in self.task.taught:
+        if isinstance(value, TaskFrame) and table in self.task.start.taught:
             value = replace(value, taught=True)
         return modes.hold(key, value)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -106,11 +106,9 @@ class KrlGoals:
 
     Attributes:
         task: The files of the job.
-        aux: External axes that the cell declares.
     """
 
     task: symbols.KrlTask
-    aux: Collection[int] = ()
 
     def visits(
         self, move: said.KrlMove, here: Scope, modes: object, points: Points
@@ -145,10 +143,6 @@ class KrlGoals:
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
-    def reader(self, here: Scope) -> KrlGoal:
-        """Return what reads the points that a statement names."""
-        return KrlGoal(self.task, here, self.aux)
-
     def _read(
         self, move: said.KrlMove, operand: ir.Operand | None, here: Scope
     ) -> FoundGoal:
@@ -156,7 +150,10 @@ class KrlGoals:
 
         On an arc or in a spline block the arm is where the arc or the block begins.
         """
-        reader, by_joints = self.reader(here), motion_of(move.word) == Motion.JOINT
+        reader, by_joints = (
+            KrlGoal(self.task, here),
+            motion_of(move.word) == Motion.JOINT,
+        )
         if move.word.endswith("_rel"):
             return reader.read_step(operand, move)
         alone = move.via is None and self.block(here) is None
@@ -242,14 +239,9 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
 
 @dataclass(frozen=True)
 class KrlGoal(goals.GoalReader):
-    """Reads points.
-
-    Attributes:
-        axes: External axes that the cell declares.
-    """
+    """Reads points."""
 
     task: symbols.KrlTask
-    axes: Collection[int] = ()
     dialect = pose_encoding.KRL_DIALECT
     brackets = "[]"
     shout = True
@@ -307,8 +299,8 @@ class KrlGoal(goals.GoalReader):
     def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
         """Return True unless an external axis that the cell declares is missing."""
         fields = dict(value.fields) if isinstance(value, KnownRecord) else {}
-        lacks_axis = any(symbols.OUTSIDE[axis - 1] not in fields for axis in self.axes)
-        return held.goal is not None or not lacks_axis
+        needed = {symbols.OUTSIDE[axis - 1] for axis in self.task.start.aux}
+        return held.goal is not None or needed <= fields.keys()
 
     def _axes(self, found: KnownRecord) -> FoundGoal:
         """Read six joint angles."""
@@ -369,7 +361,7 @@ class KrlGoal(goals.GoalReader):
         """Return the external axes that count: declared by the cell, or not 0."""
         values = [found.number(name) for name in symbols.OUTSIDE]
         return tuple(
-            value if value != 0.0 or axis in self.axes else math.nan
+            value if value != 0.0 or axis in self.task.start.aux else math.nan
             for axis, value in enumerate(values, start=1)
         )
 

@@ -356,7 +356,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     def is_taught(self, name: str, file: int, row: int) -> bool:
         """Return True if data of a statement were taught, by the cell or a comment."""
         line = self.files[file].text.line(row)
-        return name in self.taught or line in self.taught_lines[file]
+        return name in self.start.taught or line in self.taught_lines[file]
 
     # Values.
 

@@ -60,7 +60,7 @@ class KrlCollector(to_visits.TaskCollector):
         _keep_orientation(machine, found)
         _follow_partial(machine, found)
         super().__init__(machine)
-        self.krl, self.base = machine, cell_pose(machine.start.base)
+        self.krl, self.base = machine, cell_pose(machine.task.start.base)
         self.ends, self.odd = _ends(found, machine.lost), _odd_status(found)
         self.number = {id(v): k for k, v in enumerate(found)}
 
@@ -72,7 +72,7 @@ class KrlCollector(to_visits.TaskCollector):
         active = {why for _, why in modes.active}
         early = machine.early.get(at, frozenset())
         blocked = modes.blocked | active | machine.everywhere | early
-        if "track" not in machine.start.aux.values():
+        if "track" not in machine.task.start.aux.values():
             blocked -= modal_state.OF_TRACK
         given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
         if v.goal.target != Meaning.JOINTS:

@@ -39,6 +39,7 @@ from postproc.language.rapid.modal_state import (
 )
 from postproc.language.rapid.moves import (
     Goals,
+    RapidGoal,
     are_targets,
     own_numbers,
     pose_of,
@@ -67,6 +68,7 @@ class RapidMachine(TaskMachine):
     """
 
     procedures = ("proc",)
+    reader = RapidGoal
     acting = (ir.Instruction,)
     passed = _PLAIN
     task: RapidTask = field(kw_only=True)
@@ -332,7 +334,7 @@ class RapidMachine(TaskMachine):
             return here
         if name == BY_NAME:
             self._run_all_beside()
-        if kind == "left" and name not in self.start.routines:
+        if kind == "left" and name not in self.task.start.routines:
             return self.unknown(at, here, _LEFT)
         return self.outside(at, name, here)
 

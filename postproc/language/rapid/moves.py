@@ -94,7 +94,6 @@ class Goals:
     _known: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = field(
         default_factory=dict
     )
-    _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
 
     def visits(
         self, one: ir.Instruction, scope: Scope, modes: Modes, points: Points
@@ -105,7 +104,7 @@ class Goals:
         there = replace(scope, points=points) if points.routines else scope
         tool, wobj, zone, speed = self._conditions(one, ends, there)
         motion = _motion(one.name, signature)
-        reader = self.reader(there)
+        reader = RapidGoal(self.task, there)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
@@ -121,10 +120,6 @@ class Goals:
                 scope, motion, via, goal, modes, why=why,
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
-
-    def reader(self, here: Scope) -> RapidGoal:
-        """Return what reads the points that a statement names."""
-        return RapidGoal(self.task, here, self._slots)
 
     def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
         """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
@@ -184,7 +179,7 @@ class Goals:
         found = self.task.value(named, scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            why = self.reader(scope).explain_unknown(name)
+            why = RapidGoal(self.task, scope).explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
             read = TaskFrame((), why)
@@ -207,14 +202,9 @@ WORLD = TaskFrame(IDENTITY)
 
 @dataclass(frozen=True)
 class RapidGoal(goals.GoalReader):
-    """Reads points.
-
-    Attributes:
-        slots: Of points that are written in moves, by the identity of these.
-    """
+    """Reads points."""
 
     task: RapidTask
-    slots: dict[int, tuple[ir.Composite, list[int]]]
     dialect = RAPID_DIALECT
     brackets = "{}"
     system = "it stands in a system module, which is read and not rewritten"
@@ -263,9 +253,10 @@ class RapidGoal(goals.GoalReader):
         self, written: ir.Composite, file: int, row: int
     ) -> FoundGoal | None:
         """Read a point that is written in numbers alone, None for any other."""
-        if id(written) not in self.slots:
-            self.slots[id(written)] = written, _plain_slots(written)
-        slots = self.slots[id(written)][1]
+        known = self.task.written_points
+        if id(written) not in known:
+            known[id(written)] = written, _plain_slots(written)
+        slots = known[id(written)][1]
         if not slots:
             return None
         text = self.task.files[file].text

@@ -104,7 +104,11 @@ _READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 
 
 @dataclass
 class RapidTask(TaskSymbols[RapidFile]):
-    """The modules of a task."""
+    """The modules of a task.
+
+    Attributes:
+        written_points: Slots of points in numbers, by the identity of these.
+    """
 
     comments = COMMENTS
     layouts = RECORDS
@@ -112,6 +116,9 @@ class RapidTask(TaskSymbols[RapidFile]):
     targets = ("robtarget", "jointtarget")
     functions = "func"
     controller_data = staticmethod(read_controller_data)
+    written_points: dict[int, tuple[ir.Composite, list[int]]] = field(
+        default_factory=dict
+    )
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     def new_uses(self) -> NamesUsed:
@@ -163,7 +170,7 @@ class RapidTask(TaskSymbols[RapidFile]):
             name: Of the data, with an index where it has one; "" for numbers in a move.
             found: What they hold.
         """
-        if name.split("{")[0].strip().lower() in self.taught:
+        if name.split("{")[0].strip().lower() in self.start.taught:
             return True
         one = found
         while isinstance(one, tuple) and one:

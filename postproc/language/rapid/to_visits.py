@@ -52,7 +52,7 @@ class RapidCollector(to_visits.TaskCollector):
     def __init__(self, machine: RapidMachine) -> None:
         """Find where the arm may stop although a zone is written."""
         super().__init__(machine)
-        self.base = cell_pose(machine.start.base)
+        self.base = cell_pose(machine.task.start.base)
         self.paused = {id(machine.visits[k]) for k in machine.find_unsure_stops()}
         self.placed: dict[tuple[TaskFrame, Pose], Pose] = {}
 
