@@ -59,7 +59,7 @@ class ReadShift:
 
 @dataclass(frozen=True)
 class GoalReader(ABC):
-    """Reads the ends of one move.
+    """Reads where moves lead.
 
     Attributes:
         task: What names mean.
@@ -80,13 +80,18 @@ class GoalReader(ABC):
     # What a language says.
 
     @abstractmethod
-    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
-        """Read a point that is known, None where it is none that can be gone to.
+    def visits(self, one: Any, scope: Scope, modes: Any) -> Iterator[Any]:
+        """Read the visits of a move: the point of an arc, and its end.
 
         Args:
-            value: The point.
-            name: Of the point, "" where it is written.
+            one: The move.
+            scope: As `here`, without what points hold.
+            modes: What holds there.
         """
+
+    @abstractmethod
+    def read_value(self, value: Value | None) -> FoundGoal | None:
+        """Read a point that is known, None where it is none that can be gone to."""
 
     @abstractmethod
     def explain_unknown(self, name: str) -> Reason:
@@ -182,12 +187,13 @@ class GoalReader(ABC):
     def read_point(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, ir.DataObject) else ""
-        goal = self.read_value(self.task.value(operand, self.here), name)
+        goal = self.read_value(self.task.value(operand, self.here))
         if goal is None:
             why = self.explain_unknown(name) if name else AT_RUN_TIME
             return self.unknown(why, name)
-        if goal.target == Meaning.UNKNOWN:
-            return replace(goal, name=name)
+        partial = goal.why.code is Code.PARTIAL_TARGET  # it may be told elsewhere
+        if goal.target == Meaning.UNKNOWN or (name and partial):
+            return self.unknown(goal.why, name)
         if not (name or goal.slots[0] >= 0):
             return goal
         if goal.slots[0] >= 0 and not self._is_own(goal, operand):
@@ -271,7 +277,7 @@ class GoalReader(ABC):
     ) -> FoundGoal:
         """Read a point of which components have been set by themselves."""
         value = self.task.evaluate_held(held)
-        found = self.read_value(value, "") or self.unknown(AT_RUN_TIME)
+        found = self.read_value(value) or self.unknown(AT_RUN_TIME)
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial
         known = known and self.is_followed_whole(held, value)

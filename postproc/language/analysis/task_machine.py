@@ -150,7 +150,7 @@ class TaskMachine(Interpreter[Arrived]):
         acting: Statements that move, call, or change what moves are made with; they
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
-        reader: Reads points.
+        reader: Reads where moves lead.
         task: What its names mean.
         diagnostics: What else was found.
         beside: Statements that run in ways that are not followed: file, first row, and
@@ -216,11 +216,6 @@ class TaskMachine(Interpreter[Arrived]):
     @abstractmethod
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
-
-    @property
-    @abstractmethod
-    def goals(self) -> Any:
-        """What reads the visits of moves."""
 
     @abstractmethod
     def is_move(self, one: ir.SourceStatement) -> bool:
@@ -342,8 +337,8 @@ class TaskMachine(Interpreter[Arrived]):
         if not self.is_move(one):
             return ()
         modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
-        found: Iterable[Any] = self.goals.visits(one, scope, modes, points)
-        return found
+        there = replace(scope, points=points) if points.routines else scope
+        return self.reader(self.task, there).visits(one, scope, modes)
 
     # From statement to statement, see `Interpreter`.
 

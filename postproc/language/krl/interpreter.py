@@ -30,7 +30,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoal, KrlGoals, own_numbers
+from postproc.language.krl.moves import KrlGoal, own_numbers
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -100,11 +100,6 @@ class KrlMachine(TaskMachine):
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
     _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
-
-    @cached_property
-    def goals(self) -> KrlGoals:
-        """What reads destinations."""
-        return KrlGoals(self.task)
 
     def run(self) -> None:
         """Follow every way from the first routine."""

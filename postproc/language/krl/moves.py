@@ -13,7 +13,7 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import AssignedPoint, Points, Scope
+from postproc.language.analysis.assigned_points import NO_POINTS, AssignedPoint, Scope
 from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.found_goals import FoundGoal, hold_numbers, not_reached
 from postproc.language.analysis.symbols import whole
@@ -100,88 +100,6 @@ class KrlVisit(goals.FoundVisit):
         return any(word.startswith("c_") for word in self.move.words)
 
 
-@dataclass(frozen=True)
-class KrlGoals:
-    """Reads the destinations of moves.
-
-    Attributes:
-        task: The files of the job.
-    """
-
-    task: symbols.KrlTask
-
-    def visits(
-        self, move: said.KrlMove, here: Scope, modes: object, points: Points
-    ) -> Iterator[KrlVisit]:
-        """Read the visits of a move: the point of an arc, and its end."""
-        motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
-        block, given = self.block(here), dict[str, Any]()
-        in_joints = False
-        if block is not None:
-            move, given = self._in_block(move, here, block)
-            begin = self.task.files[here.file].text.statement(block.start)
-            in_joints = (
-                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
-            )
-        if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._read(move, move.to, here), SPLINE)
-            yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
-            return
-        there = replace(here, points=points) if points.routines else here
-        angle = math.radians(self.task.number(move.angle, here))
-        unknown = move.angle is not None and math.isnan(angle)
-        why = ANGLE if unknown else NO_REASON
-        if move.via is not None:
-            goal = self._read(move, move.via, there)
-            yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
-        goal = self._read(move, move.to, there)
-        if why:
-            goal = not_reached(goal, ANGLE)
-        yield KrlVisit(
-            here, motion, False, goal, modes,
-            why=SPLINE if in_joints else NO_REASON,
-            arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
-        )  # fmt: skip
-
-    def _read(
-        self, move: said.KrlMove, operand: ir.Operand | None, here: Scope
-    ) -> FoundGoal:
-        """Read where a move goes: on from where the arm is, or to a point.
-
-        On an arc or in a spline block the arm is where the arc or the block begins.
-        """
-        reader, by_joints = (
-            KrlGoal(self.task, here),
-            motion_of(move.word) == Motion.JOINT,
-        )
-        if move.word.endswith("_rel"):
-            return reader.read_step(operand, move)
-        alone = move.via is None and self.block(here) is None
-        if alone and isinstance(operand, ir.DataObject) and operand.name in PRESENT:
-            step = Meaning.BY if by_joints else Meaning.RELATIVE_UFRAME
-            nowhere = (0.0,) * pose_encoding.WIDTH
-            return FoundGoal(step, nowhere, name=operand.name, why=STAYS)
-        return _reach(reader.goal(operand), by_joints, alone)
-
-    def block(self, here: Scope) -> range | None:
-        """Return the rows of the spline block that a move stands in."""
-        blocks = self.task.files[here.file].splines
-        at = bisect_right(blocks, here.row, key=lambda rows: rows.start) - 1
-        return blocks[at] if at >= 0 and here.row in blocks[at] else None
-
-    def _in_block(
-        self, move: said.KrlMove, here: Scope, rows: range
-    ) -> tuple[said.KrlMove, dict[str, Any]]:
-        """Blend the last move of a block as its end says; say what visits share."""
-        file = self.task.files[here.file]
-        inner = here.row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
-        end = file.text.statement(rows.stop)
-        if isinstance(end, said.SplineBlock) and not inner:
-            move = replace(move, words=(*move.words, *end.words))
-        shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
-        return move, shared
-
-
 def _reach(goal: FoundGoal, by_joints: bool, alone: bool) -> FoundGoal:
     """Return where a move to a point leads, as far as that is followed.
 
@@ -239,13 +157,82 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
 
 @dataclass(frozen=True)
 class KrlGoal(goals.GoalReader):
-    """Reads points."""
+    """Reads where moves lead."""
 
     task: symbols.KrlTask
     dialect = pose_encoding.KRL_DIALECT
     brackets = "[]"
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
+
+    # Moves.
+
+    def visits(self, one: said.KrlMove, scope: Scope, modes: Any) -> Iterator[KrlVisit]:
+        """Read the visits of a move, see `GoalReader.visits`."""
+        motion, kind = motion_of(one.word), one.word.removesuffix("_rel")
+        block, given = self._block, dict[str, Any]()
+        in_joints = False
+        if block is not None:
+            one, given = self._in_block(one, block)
+            begin = self.task.files[scope.file].text.statement(block.start)
+            in_joints = (
+                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
+            )
+        if kind not in _POINTS[block is not None, in_joints]:
+            goal = not_reached(self.at(scope)._read_end(one, one.to), SPLINE)
+            yield KrlVisit(scope, motion, False, goal, modes, **given, move=one)
+            return
+        angle = math.radians(self.task.number(one.angle, scope))
+        unknown = one.angle is not None and math.isnan(angle)
+        why = ANGLE if unknown else NO_REASON
+        if one.via is not None:
+            goal = self._read_end(one, one.via)
+            yield KrlVisit(scope, motion, True, goal, modes, why=why, **given, move=one)
+        goal = self._read_end(one, one.to)
+        if why:
+            goal = not_reached(goal, ANGLE)
+        yield KrlVisit(
+            scope, motion, False, goal, modes,
+            why=SPLINE if in_joints else NO_REASON,
+            arc_angle=angle, curved=in_joints or kind == "spl", **given, move=one,
+        )  # fmt: skip
+
+    def _read_end(self, move: said.KrlMove, operand: ir.Operand | None) -> FoundGoal:
+        """Read where a move goes: on from where the arm is, or to a point.
+
+        On an arc or in a spline block the arm is where the arc or the block begins.
+        """
+        by_joints = motion_of(move.word) == Motion.JOINT
+        if move.word.endswith("_rel"):
+            return self._read_step(operand, move)
+        alone = move.via is None and self._block is None
+        if alone and isinstance(operand, ir.DataObject) and operand.name in PRESENT:
+            step = Meaning.BY if by_joints else Meaning.RELATIVE_UFRAME
+            nowhere = (0.0,) * pose_encoding.WIDTH
+            return FoundGoal(step, nowhere, name=operand.name, why=STAYS)
+        return _reach(self.goal(operand), by_joints, alone)
+
+    @property
+    def _block(self) -> range | None:
+        """The rows of the spline block that the move stands in."""
+        blocks, row = self.task.files[self.here.file].splines, self.here.row
+        at = bisect_right(blocks, row, key=lambda rows: rows.start) - 1
+        return blocks[at] if at >= 0 and row in blocks[at] else None
+
+    def _in_block(
+        self, move: said.KrlMove, rows: range
+    ) -> tuple[said.KrlMove, dict[str, Any]]:
+        """Blend the last move of a block as its end says; say what visits share."""
+        here = replace(self.here, points=NO_POINTS)
+        file = self.task.files[here.file]
+        inner = here.row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
+        end = file.text.statement(rows.stop)
+        if isinstance(end, said.SplineBlock) and not inner:
+            move = replace(move, words=(*move.words, *end.words))
+        shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
+        return move, shared
+
+    # Points.
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read home positions, where the arm is, and products of frames."""
@@ -258,17 +245,12 @@ class KrlGoal(goals.GoalReader):
                 return self._product(first, second)
         return None
 
-    # Points.
-
-    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
+    def read_value(self, value: Value | None) -> FoundGoal | None:
         """Read joint angles or a position."""
         if not isinstance(value, KnownRecord) or not value.whole:
             return None
         by_axes = not value.by_name.keys().isdisjoint(symbols.AXES)
-        goal = self._axes(value) if by_axes else self._pose(value)
-        if name and goal.why.code is Code.PARTIAL_TARGET:
-            return self.unknown(PARTIAL)  # what it lacks may be told elsewhere
-        return goal
+        return self._axes(value) if by_axes else self._pose(value)
 
     def is_shared(self, name: str) -> bool:
         """Return True for GLOBAL data."""
@@ -444,7 +426,7 @@ class KrlGoal(goals.GoalReader):
 
     # Steps.
 
-    def read_step(self, operand: ir.Operand | None, move: said.KrlMove) -> FoundGoal:
+    def _read_step(self, operand: ir.Operand | None, move: said.KrlMove) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
         by_joints = motion_of(move.word) == Motion.JOINT
         found = self.task.value(operand, self.here)

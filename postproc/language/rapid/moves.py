@@ -13,7 +13,7 @@ from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import Points, Scope
+from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame, compose_poses
 from postproc.language.analysis.found_goals import FoundGoal, not_reached
 from postproc.language.analysis.values import (
@@ -85,35 +85,37 @@ class RapidVisit(goals.FoundVisit):
     total: tuple[float, ...] = field(kw_only=True, default=())
 
 
-@dataclass
-class Goals:
-    """Reads the arguments of moves; frames by name are read once."""
+WORLD = TaskFrame(IDENTITY)
+
+
+@dataclass(frozen=True)
+class RapidGoal(goals.GoalReader):
+    """Reads where moves lead; frames by name are read once."""
 
     task: RapidTask
-    _frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
-    _known: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = field(
-        default_factory=dict
-    )
+    dialect = RAPID_DIALECT
+    brackets = "{}"
+    system = "it stands in a system module, which is read and not rewritten"
+
+    # Moves.
 
     def visits(
-        self, one: ir.Instruction, scope: Scope, modes: Modes, points: Points
+        self, one: ir.Instruction, scope: Scope, modes: Modes
     ) -> Iterator[RapidVisit]:
-        """Read the visits of a move: the point of an arc, and its end."""
+        """Read the visits of a move, see `GoalReader.visits`."""
         signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
-        there = replace(scope, points=points) if points.routines else scope
-        tool, wobj, zone, speed = self._conditions(one, ends, there)
+        tool, wobj, zone, speed = self._conditions(one, ends)
         motion = _motion(one.name, signature)
-        reader = RapidGoal(self.task, there)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
-        total, untold = self._total(one, there)
+        total, untold = self._total(one)
         why = why or untold
         for via in (True, False) if signature.via >= 0 else (False,):
-            goal = reader.goal(ends[via])
+            goal = self.goal(ends[via])
             if goal.target == (Meaning.POSE if signature.joints else Meaning.JOINTS):
-                goal = reader.unknown(goals.AT_RUN_TIME, goal.name)
+                goal = self.unknown(goals.AT_RUN_TIME, goal.name)
             if not (via or signature.reaches):
                 goal = not_reached(goal, why)
             yield RapidVisit(
@@ -121,28 +123,26 @@ class Goals:
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
 
-    def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
+    def load(self, operand: ir.Operand | None) -> tuple[float, ...]:
         """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
 
         ``load0`` and other loads up to a hundredth of a kilogram are no load.
         """
-        found = load_of(self.task.value(operand, scope))
+        found = load_of(self.task.value(operand, self.here))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
-    def _total(
-        self, one: ir.Instruction, scope: Scope
-    ) -> tuple[tuple[float, ...], Reason]:
+    def _total(self, one: ir.Instruction) -> tuple[tuple[float, ...], Reason]:
         r"""Read ``\TLoad``: all that the arm carries, and why that is not known."""
         given = [argument for argument in one.arguments if argument.name == "tload"]
         if not given:
             return (), NO_REASON
-        found = self.load(given[0].value, scope)
+        found = self.load(given[0].value)
         if not found or given[0].passed_on:
             return (), _LOAD_UNKNOWN
         return (() if found == EMPTY_HAND else found), NO_REASON
 
     def _conditions(
-        self, one: ir.Instruction, ends: Sequence[ir.Operand | None], scope: Scope
+        self, one: ir.Instruction, ends: Sequence[ir.Operand | None]
     ) -> tuple[TaskFrame, TaskFrame, float, float]:
         """Read tool, work object, zone [mm] and speed [m/s] of a move.
 
@@ -150,43 +150,42 @@ class Goals:
         """
         own = [a for a in one.arguments if all(a.value is not e for e in ends)]
         named = all(a.value is None or self._is_fixed(a.value) for a in own)
-        stops = one.name in AT_A_STOP
+        stops, scope, known = one.name in AT_A_STOP, self.here, self.task.conditions
         key = stops, *own, *scope.place, scope.loops, scope.given
-        if named and key in self._known:
-            return self._known[key]
-        arguments = _Arguments(self.task, one.arguments, scope)
-        zone = np.nan if stops else arguments.zone()
-        operand = arguments.option("wobj")
-        wobj = WORLD if operand is None else self._frame("wobj", operand, scope)
-        operand = arguments.of_type("tooldata")
+        if named and key in known:
+            return known[key]
+        zone = np.nan if stops else self._zone(one.arguments)
+        operand = _find_option(one.arguments, "wobj")
+        wobj = WORLD if operand is None else self._frame("wobj", operand)
+        operand = self._find_argument(one.arguments, "tooldata")
         tool = TaskFrame((), _NO_TOOL)
         if operand is not None:
-            tool = self._frame("tool", operand, scope)
-        found = tool, wobj, zone, arguments.speed()
+            tool = self._frame("tool", operand)
+        found = tool, wobj, zone, self._speed(one.arguments)
         if named:
-            self._known[key] = found
+            known[key] = found
         return found
 
     # Tools and work objects.
 
-    def _frame(self, kind: str, operand: ir.Operand, scope: Scope) -> TaskFrame:
+    def _frame(self, kind: str, operand: ir.Operand) -> TaskFrame:
         """Read a tool or a work object, by name once for each place it may mean."""
-        named, scope = self.task.behind(operand, scope)
+        named, scope = self.task.behind(operand, self.here)
         key, fixed = (kind, named, *scope.place), self._is_fixed(named)
-        if fixed and key in self._frames:
-            return self._frames[key]
+        if fixed and key in self.task.frames:
+            return self.task.frames[key]
         name = named.name if isinstance(named, ir.DataObject) else f"the {kind}"
         found = self.task.value(named, scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            why = RapidGoal(self.task, scope).explain_unknown(name)
+            why = self.at(scope).explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
             read = TaskFrame((), why)
         else:
             read = replace(read, taught=self.task.is_taught(name, found))
         if fixed:
-            self._frames[key] = read
+            self.task.frames[key] = read
         return read
 
     def _is_fixed(self, operand: ir.Operand | None) -> bool:
@@ -196,20 +195,52 @@ class Goals:
                 return name not in self.task.written
         return False
 
+    # Zones and speeds.
 
-WORLD = TaskFrame(IDENTITY)
+    def _find_argument(
+        self, arguments: Sequence[ir.Argument], type_: str
+    ) -> ir.Operand | None:
+        """Return the only argument by place that is data of a type."""
+        placed = (one.value for one in arguments if not one.name)
+        found = [one for one in placed if self._type(one) == type_]
+        return found[0] if len(found) == 1 else None
 
+    def _type(self, operand: ir.Operand | None) -> str:
+        operand, scope = self.task.behind(operand, self.here)
+        if not isinstance(operand, ir.DataObject):
+            return ""
+        found = self.task.datum(operand.name, scope)
+        given = self.task.controller_data(operand.name) or (None, "")
+        return given[1] if found is None else found[1].type
 
-@dataclass(frozen=True)
-class RapidGoal(goals.GoalReader):
-    """Reads points."""
+    def _numbers(self, arguments: Sequence[ir.Argument], type_: str) -> list[float]:
+        """Return the first two numbers of the only argument of a type, NaN for none."""
+        found = self.task.value(self._find_argument(arguments, type_), self.here)
+        return [number_in(one) for one in (*list_leaves(found), None, None)][:2]
 
-    task: RapidTask
-    dialect = RAPID_DIALECT
-    brackets = "{}"
-    system = "it stands in a system module, which is read and not rewritten"
+    def _zone(self, arguments: Sequence[ir.Argument]) -> float:
+        """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
+        if any(one.name == "inpos" for one in arguments):
+            return np.nan  # stop-point data stand instead of the zone
+        size = _find_option(arguments, "z")
+        stops, tcp = self._numbers(arguments, "zonedata")
+        if size is not None:
+            own = self.task.number(size, self.here)
+            return own if own >= 0.0 and stops != 1.0 else UNKNOWN_ZONE
+        if np.isnan(stops + tcp):
+            return UNKNOWN_ZONE
+        return np.nan if stops else tcp
 
-    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
+    def _speed(self, arguments: Sequence[ir.Argument]) -> float:
+        """Return the speed along a path [m/s], NaN where it is not known."""
+        own = _find_option(arguments, "v")
+        if own is not None:
+            return self.task.number(own, self.here) / 1000.0
+        return self._numbers(arguments, "speeddata")[0] / 1000.0
+
+    # Points.
+
+    def read_value(self, value: Value | None) -> FoundGoal | None:
         """Take a robtarget or jointtarget apart."""
         if not isinstance(value, tuple):
             return None
@@ -337,65 +368,9 @@ class RapidGoal(goals.GoalReader):
         return ""
 
 
-@dataclass
-class _Arguments:
-    """The arguments of a move.
-
-    Attributes:
-        task: The modules.
-        arguments: All of them.
-        scope: Where the move stands.
-    """
-
-    task: RapidTask
-    arguments: Sequence[ir.Argument]
-    scope: Scope
-
-    def option(self, name: str) -> ir.Operand | None:
-        r"""Return the value of ``\name:=value``, None where it is not there."""
-        found = (one for one in self.arguments if one.name == name)
-        return next((one.value for one in found), None)
-
-    def of_type(self, type_: str) -> ir.Operand | None:
-        """Return the only argument by place that is data of a type."""
-        found = [
-            one.value
-            for one in self.arguments
-            if not one.name and self._type(one.value) == type_
-        ]
-        return found[0] if len(found) == 1 else None
-
-    def _type(self, operand: ir.Operand | None) -> str:
-        operand, scope = self.task.behind(operand, self.scope)
-        if not isinstance(operand, ir.DataObject):
-            return ""
-        found = self.task.datum(operand.name, scope)
-        given = self.task.controller_data(operand.name) or (None, "")
-        return given[1] if found is None else found[1].type
-
-    def _numbers(self, type_: str) -> list[float]:
-        """Return the first two numbers of the only argument of a type, NaN for none."""
-        found = self.task.value(self.of_type(type_), self.scope)
-        return [number_in(one) for one in (*list_leaves(found), None, None)][:2]
-
-    def zone(self) -> float:
-        """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
-        if any(one.name == "inpos" for one in self.arguments):
-            return np.nan  # stop-point data stand instead of the zone
-        size, (stops, tcp) = self.option("z"), self._numbers("zonedata")
-        if size is not None:
-            own = self.task.number(size, self.scope)
-            return own if own >= 0.0 and stops != 1.0 else UNKNOWN_ZONE
-        if np.isnan(stops + tcp):
-            return UNKNOWN_ZONE
-        return np.nan if stops else tcp
-
-    def speed(self) -> float:
-        """Return the speed along a path [m/s], NaN where it is not known."""
-        own = self.option("v")
-        if own is not None:
-            return self.task.number(own, self.scope) / 1000.0
-        return self._numbers("speeddata")[0] / 1000.0
+def _find_option(arguments: Sequence[ir.Argument], name: str) -> ir.Operand | None:
+    r"""Return the value of ``\name:=value``, None where it is not there."""
+    return next((one.value for one in arguments if one.name == name), None)
 
 
 @cache

@@ -12,6 +12,7 @@ from typing import Any
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
@@ -108,6 +109,8 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     Attributes:
         written_points: Slots of points in numbers, by the identity of these.
+        frames, conditions: Tools and work objects that have been read, by name; and
+            with zones and speeds, by arguments.
     """
 
     comments = COMMENTS
@@ -118,6 +121,10 @@ class RapidTask(TaskSymbols[RapidFile]):
     controller_data = staticmethod(read_controller_data)
     written_points: dict[int, tuple[ir.Composite, list[int]]] = field(
         default_factory=dict
+    )
+    frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
+    conditions: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = (
+        field(default_factory=dict)
     )
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
 
