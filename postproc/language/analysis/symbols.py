@@ -697,7 +697,8 @@ class TaskSymbols(ABC, Generic[F]):
                 fields[one.name] = WrittenNumber(one.value)
         if self.by_name and layout:
             known = all(one.value is not None for one in held.components)
-            known &= held.goal is None or (isinstance(base, KnownRecord) and base.whole)
+            given = held.goal is not None or base is not None
+            known &= not given or (isinstance(base, KnownRecord) and base.whole)
             return KnownRecord(tuple(fields.items()), known)
         return put_together(fields, layout) if len(fields) >= len(names) else None
 
