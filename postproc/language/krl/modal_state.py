@@ -178,9 +178,9 @@ _PARTS: Mapping[str, Mapping[str, str]] = {
     "$vel": {"cp": "speed"}, "$apo": {"cdis": "distance", "cptp": "overlap"},
 }  # fmt: skip
 """Variables that are set to numbers: components, and the modes that they are."""
-PLANNED, _SETTING = symbols.NAMES["planned"], symbols.NAMES["setting"]
+PLANNED, _SETTING = said.NAMES["planned"], said.NAMES["setting"]
 HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
-HARMLESS = symbols.NAMES["harmless"]
+HARMLESS = said.NAMES["harmless"]
 
 
 SUBMIT = "a submit program may set {} at any time"

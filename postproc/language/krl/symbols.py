@@ -22,18 +22,11 @@ from postproc.language.krl import syntax as said
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.shifts import Shift, ShiftKind
-from postproc.language.text.symbol_column import read_kinds, read_names
+from postproc.language.text.symbol_column import read_names
 
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
-MOVE_WORDS = frozenset(
-    """
-    ptp lin circ sptp slin scirc spl ptp_rel lin_rel circ_rel sptp_rel slin_rel
-    scirc_rel spl_rel
-    """.split()
-)
-"""Words that a move begins with."""
 AXES = tuple(f"a{k}" for k in range(1, 7))
 OUTSIDE = tuple(f"e{k}" for k in range(1, 7))
 FIELDS: Mapping[str, Layout] = {
@@ -70,11 +63,8 @@ PERHAPS = "perhaps"
 HELD = frozenset(TABLES) | CORRECTION_FRAMES | SWITCHES
 """Names of data that hold until the program sets them again."""
 
-NAMES = read_kinds(Path(__file__).with_name("names.txt"))
-"""Names of routines, functions and system variables, by what they do."""
-STILL = NAMES["still"]
-WRITING = NAMES["writing"]
-FUNCTIONS = NAMES["function"]
+STILL, WRITING = said.NAMES["still"], said.NAMES["writing"]
+FUNCTIONS = said.NAMES["function"]
 # Routines of packages that are known neither to move the arm nor to set frames.
 
 AHEAD = "ahead"
@@ -202,7 +192,7 @@ class KrlTask(TaskSymbols[KrlFile]):
         """
         found = set[str]()
         for file in (f for f in self.files if not f.is_submit):
-            words = file.text.words(file.text.of_kind(holds_odd), MOVE_WORDS)
+            words = file.text.words(file.text.of_kind(holds_odd), said.NAMES["move"])
             found |= words if file.routines else words.difference(TABLES)
         return frozenset(found)
 

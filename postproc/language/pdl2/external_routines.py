@@ -8,12 +8,10 @@ from pathlib import Path
 
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.program import Program
-from postproc.language.text.symbol_column import read_kinds, read_names
-
-NAMES = read_kinds(Path(__file__).with_name("names.txt"))
-"""Names of built-in routines by what they do."""
+from postproc.language.text.symbol_column import read_names
 
 TRACKING = "sensor_trk"
 """Built-in routine that lets a sensor lead the arm, or ends that."""
@@ -62,7 +60,7 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
         return RoutineEffect(said)
     if name == TRACKING:
         return RoutineEffect.TRACKS
-    if name in NAMES["built-in"]:
+    if name in ast.NAMES["built-in"]:
         return RoutineEffect.STILL
     known = not start.assume_motion and name in list_motionless()
     return RoutineEffect.KNOWN if known else RoutineEffect.UNKNOWN

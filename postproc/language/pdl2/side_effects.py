@@ -14,7 +14,6 @@ from postproc.language.analysis.call_graph import lead_to_recursion, reach
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES
 from postproc.language.pdl2.external_routines import (
-    NAMES,
     TRACKING,
     RoutineEffect,
     effect_of,
@@ -23,7 +22,7 @@ from postproc.language.pdl2.external_routines import (
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Program
 
-PURE, CHANGING = NAMES["pure"], NAMES["changing"]
+PURE, CHANGING = ast.NAMES["pure"], ast.NAMES["changing"]
 
 NODES = frozenset({"node_app", "node_del", "node_ins"})
 """Those of them that change how many nodes a path has, and no number in them."""
@@ -44,10 +43,6 @@ _MOVING = re.compile(
 )
 _STRING = re.compile(r"'[^']*'")
 _NEXT = re.compile(r";|\b(?:THEN|ELSE|DO|REPEAT)\b|\bCASE\s*\([^)]*\)\s*:", re.I)
-_NO_CALLS = frozenset(
-    "if select case for while until wait write read encode decode open and or not div "
-    "mod then do of to downto step xor condition event".split()
-)
 
 
 def words_in(text: str) -> frozenset[str]:
@@ -74,7 +69,7 @@ def is_harmless(text: str) -> bool:
     if not all(map(_HARMLESS.match, parts)) or _MOVING.search(text):
         return False
     called = {name.lower() for name in _CALL.findall(text)}
-    return called <= PURE | CHANGING | _NO_CALLS
+    return called <= PURE | CHANGING | ast.NAMES["statement"]
 
 
 @dataclass(frozen=True)

@@ -45,35 +45,17 @@ class Signature:
         )
 
 
-POINT, ARC = Signature(), Signature(to=1, via=0)
-JOINTS = Signature(joints=True)
-SEARCH = Signature(to=2, reaches=False, given=1)  # signal, where it came, destination
-ARC_SEARCH = Signature(to=3, via=2, reaches=False, given=1)
-
-_KINDS: Mapping[Signature, str] = {
-    POINT: """
-        MoveJ MoveL MoveJDO MoveLDO MoveJAO MoveLAO MoveJGO MoveLGO MoveJSync MoveLSync
-        TriggJ TriggL TriggJIOs TriggLIOs
-        ArcL ArcLStart ArcLEnd ArcMoveJ ArcMoveL
-        ArcL1 ArcL1Start ArcL1End ArcL2 ArcL2Start ArcL2End
-        CalibJ CalibL NutJ NutL
-        SpotJ SpotL SpotMJ SpotML PaintL DispL CapL
-    """,
-    ARC: """
-        MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
-        ArcC ArcCStart ArcCEnd ArcMoveC
-        ArcC1 ArcC1Start ArcC1End ArcC2 ArcC2Start ArcC2End PaintC DispC CapC
-    """,
-    JOINTS: "MoveAbsJ TriggAbsJ ArcMoveAbsJ",
-    Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
-    SEARCH: "SearchL",
-    ARC_SEARCH: "SearchC",
-    Signature(to=2, joints=True, reaches=False, given=1): "SearchExtJ",
+_SIGNATURES = {
+    "point": Signature(),
+    "arc": Signature(to=1, via=0),
+    "joints": Signature(joints=True),
+    "axes": Signature(joints=True, reaches=False),  # the arm stays
+    "search": Signature(to=2, reaches=False, given=1),  # signal, where it came
+    "arc-search": Signature(to=3, via=2, reaches=False, given=1),
+    "joint-search": Signature(to=2, joints=True, reaches=False, given=1),
 }
 MOTIONS: Mapping[str, Signature] = {
-    name.lower(): signature
-    for signature, names in _KINDS.items()
-    for name in names.split()
+    name: signature for kind, signature in _SIGNATURES.items() for name in NAMES[kind]
 }
 
 
