@@ -1,12 +1,16 @@
-"""Instructions of RAPID by name: which move, and what their arguments are."""
+"""Instructions of RAPID by name, which move, and data that have a name at first."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.ir import Argument, Operand
 from postproc.language.text.symbol_column import read_kinds
 
@@ -89,3 +93,37 @@ SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
 BY_NAME = "callbyvar"
 BY_STRING = frozenset(["setdataval", "setalldataval"])
 """Instructions that change data whose names they are given in strings."""
+
+# Data that the controller gives names to.
+
+_UPRIGHT = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+_NO_LOAD = 0.001, (0.0, 0.0, 0.001), _UPRIGHT[1], 0.0, 0.0, 0.0
+_BUILT_IN: Mapping[str, tuple[Any, str]] = {
+    "true": (1.0, "bool"), "false": (0.0, "bool"), "pi": (math.pi, "num"),
+    "tool0": ((1.0, _UPRIGHT, _NO_LOAD), "tooldata"), "load0": (_NO_LOAD, "loaddata"),
+    "wobj0": ((0.0, 1.0, "", _UPRIGHT, _UPRIGHT), "wobjdata"),
+    "fine": ((1.0, 0.0), "zonedata"),
+}  # fmt: skip
+Z0 = 0.3  # [mm]
+
+
+@cache
+def read_controller_data(name: str) -> tuple[Value, str] | None:
+    """Return data of the controller, as far as moves take them, and their type.
+
+    >>> read_controller_data("z0")[0][1].value, read_controller_data("zone")
+    (0.3, None)
+    """
+    found, usual = _BUILT_IN.get(name), re.match(r"([vz])(\d+)$", name)
+    if usual is not None:
+        size = float(usual[2])
+        zone = (0.0, size or Z0), "zonedata"
+        found = zone if usual[1] == "z" else ((size,), "speeddata")
+    return None if found is None else (_as_values(found[0]), found[1])
+
+
+def _as_values(data: Any) -> Value:
+    """Return nested numbers and texts as values."""
+    if isinstance(data, tuple):
+        return tuple(map(_as_values, data))
+    return data if isinstance(data, str) else WrittenNumber(data)

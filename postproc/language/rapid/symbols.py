@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
-from typing import Any
+from functools import cached_property
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
@@ -33,6 +31,7 @@ from postproc.language.rapid.instructions import (
     MOTIONS,
     READING,
     SYNCHRONOUS,
+    read_controller_data,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, inside
@@ -66,40 +65,6 @@ RECORDS: Mapping[str, Layout] = {
     ),
 }  # fmt: skip
 """Components of data by type."""
-
-_UPRIGHT = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-_NO_LOAD = 0.001, (0.0, 0.0, 0.001), _UPRIGHT[1], 0.0, 0.0, 0.0
-_BUILT_IN: Mapping[str, tuple[Any, str]] = {
-    "true": (1.0, "bool"), "false": (0.0, "bool"), "pi": (math.pi, "num"),
-    "tool0": ((1.0, _UPRIGHT, _NO_LOAD), "tooldata"), "load0": (_NO_LOAD, "loaddata"),
-    "wobj0": ((0.0, 1.0, "", _UPRIGHT, _UPRIGHT), "wobjdata"),
-    "fine": ((1.0, 0.0), "zonedata"),
-}  # fmt: skip
-Z0 = 0.3  # [mm]
-
-
-@cache
-def read_controller_data(name: str) -> tuple[Value, str] | None:
-    """Return data of the controller, as far as moves take them, and their type.
-
-    >>> read_controller_data("z0")[0][1].value, read_controller_data("zone")
-    (0.3, None)
-    """
-    found, usual = _BUILT_IN.get(name), re.match(r"([vz])(\d+)$", name)
-    if usual is not None:
-        size = float(usual[2])
-        zone = (0.0, size or Z0), "zonedata"
-        found = zone if usual[1] == "z" else ((size,), "speeddata")
-    return None if found is None else (_as_values(found[0]), found[1])
-
-
-def _as_values(data: Any) -> Value:
-    """Return nested numbers and texts as values."""
-    if isinstance(data, tuple):
-        return tuple(map(_as_values, data))
-    return data if isinstance(data, str) else WrittenNumber(data)
-
-
 _READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
 
 
