@@ -68,6 +68,7 @@ class GoalReader(ABC):
         brackets: Around the index of an element.
         shout: Names are upper case in messages.
         system: Why numbers of files that are not rewritten must stay.
+        outlives: Why those stay that data of no routine are given, "" if they need not.
     """
 
     task: TaskSymbols[Any]
@@ -76,6 +77,7 @@ class GoalReader(ABC):
     brackets: ClassVar[str]
     shout: ClassVar[bool] = False
     system: ClassVar[str]
+    outlives: ClassVar[str] = ""
 
     # What a language says.
 
@@ -106,17 +108,9 @@ class GoalReader(ABC):
             slot: Its first number, -1 where none is written.
         """
 
-    def is_shared(self, name: str) -> bool:
-        """Return True if other programs may read a point too."""
-        return False
-
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read what only this language can go to, None for all else."""
         return None
-
-    def explain_kept(self, held: AssignedPoint) -> Iterator[str]:
-        """Say why what an assigned point was given must keep its numbers."""
-        return iter(())
 
     def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
         """Return True if all that a move needs of an assigned point is known."""
@@ -203,10 +197,10 @@ class GoalReader(ABC):
 
     def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
         """Return the goal of a move that names data, and elements of them."""
-        return replace(
-            goal, name=name + steps, pins=self.explain_pinned(name, goal.point),
-            shared=self.is_shared(name),
-        )  # fmt: skip
+        declared = self.task.datum(name, self.here)
+        shared = declared is not None and declared[1].scope == "global"
+        pins = self.explain_pinned(name, goal.point)
+        return replace(goal, name=name + steps, pins=pins, shared=shared)
 
     def _is_own(self, goal: FoundGoal, operand: ir.Operand | None) -> bool:
         """Return True if all numbers of a point stand in its own statement.
@@ -258,7 +252,8 @@ class GoalReader(ABC):
         for place in held.chain:
             where = self.at(Scope(*place[:3], row=self.here.row))
             why.append(where.explain_pinned(place[-1], goal.point))
-        why += self.explain_kept(held)
+        of_all = (place[-1] for place in held.chain if self.outlives and not place[2])
+        why += [f"{one} {self.outlives}" for one in of_all]
         pins = next(filter(None, (goal.pins, *why)), "")
         if held.components:
             return self._set_components(held, goal, name, pins)

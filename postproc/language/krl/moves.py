@@ -164,6 +164,7 @@ class KrlGoal(goals.GoalReader):
     brackets = "[]"
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
+    outlives = "stands in a data list: it outlives the run"
 
     # Moves.
 
@@ -252,11 +253,6 @@ class KrlGoal(goals.GoalReader):
         by_axes = not value.by_name.keys().isdisjoint(symbols.AXES)
         return self._axes(value) if by_axes else self._pose(value)
 
-    def is_shared(self, name: str) -> bool:
-        """Return True for GLOBAL data."""
-        declared = self.task.datum(name, self.here)
-        return declared is not None and declared[1].scope == "global"
-
     def explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
         code, text = self.task.explain_unknown(name, self.here)
@@ -271,12 +267,6 @@ class KrlGoal(goals.GoalReader):
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""
-
-    def explain_kept(self, held: AssignedPoint) -> Iterator[str]:
-        """Say that points of lists keep what they are given."""
-        for place in held.chain:
-            if not place[2]:
-                yield f"{place[-1]} stands in a data list: it outlives the run"
 
     def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
         """Return True unless an external axis that the cell declares is missing."""
