@@ -70,3 +70,15 @@ def test_a_point_may_be_shifted_as_often_as_a_loop_runs():
     assert found.visits.target.meaning.tolist() == [Meaning.POSE]
     start = job("LIN XP1").visits.target.values[0]
     np.testing.assert_allclose(found.visits.target.values[0, 2], start[2] + 1000.0)
+
+
+def test_a_point_is_assigned_once_and_each_move_takes_of_it_what_it_can():
+    """Two moves to one point without S and T: on a line, and by joints."""
+    lines = ["DECL POS q", "DECL E6AXIS r", "q=XLIN", "LIN q", "PTP q"]
+    found = job(*lines, "r=XA", "PTP r", "LIN r")
+    v = found.visits
+    told = [v.reasons[k].text for k in v.reason.tolist()]
+    assert told[0] == told[2] == "" and "without S and T" in told[1]
+    assert "the move to it is no PTP" in told[3]
+    meanings = [Meaning.POSE, Meaning.UNKNOWN, Meaning.JOINTS, Meaning.UNKNOWN]
+    assert v.target.meaning.tolist() == meanings
