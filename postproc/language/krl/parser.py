@@ -98,7 +98,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "header": lambda c: said.AccessHeader(),
     "procedure": _routine("def"),
     "function": _routine("deffct"),
-    "data_list": lambda c: said.DataList(low(c[0]), bool(_tokens(c, "PUBLIC"))),
+    "data_list": lambda c: said.DataList(low(c[0])),
     "type": part("type"),
     "parameter": lambda c: _parameter(*_tokens(c, "NAME")),
     "empty_dimensions": lambda c: None,

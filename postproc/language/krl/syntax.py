@@ -45,7 +45,6 @@ class DataList(SourceStatement):
     """``DEFDAT name PUBLIC``."""
 
     name: str
-    public: bool = False
 
 
 @dataclass(frozen=True, slots=True)
