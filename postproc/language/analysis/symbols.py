@@ -660,17 +660,16 @@ class TaskSymbols(ABC, Generic[F]):
         inside = all(1 <= at <= n for at, n in zip(found, sizes, strict=True))
         return found if inside else None
 
-    def evaluate_components(
-        self, part: PointPart, value: ir.Operand, here: Scope
+    def list_components(
+        self, part: PointPart, found: Value | None
     ) -> Sequence[tuple[str, float | None]]:
         """Return the components that an assignment sets, and what it gives to them.
 
         Args:
             part: What is set.
-            value: What it is given.
-            here: The assignment.
+            found: What it is given.
         """
-        found, type_ = self.value(value, here), self.type_of(part.place)
+        type_ = self.type_of(part.place)
         names = self.spell(type_, part.component)
         if isinstance(found, KnownRecord):
             fitting = found.whole and not part.component and type_ in self.layouts
@@ -768,31 +767,38 @@ class TaskSymbols(ABC, Generic[F]):
         wholes = map(_without_components, ir.data_in(value))
         inside = [held for one in wholes if (held := self.find_held(one, here))]
         plain, names = replace(here, points=NO_POINTS), self.names_of(value)
-        given = [name for name, _, _ in here.given]
-        quick = not (inside or self.calls_routine(value)) and names.isdisjoint(given)
-        steady = quick or self.value(value, here) == self.value(value, plain)
+        found, given = self.value(value, here), [one[0] for one in here.given]
+        steady = not (inside or self.calls_routine(value)) and names.isdisjoint(given)
+        steady = steady or not here.points.routines or found == self.value(value, plain)
         names = names.union(own, *(point.names for point in inside))
         if part.component:
             point = here.points.held.get((place, index)) or AssignedPoint(place, index)
         elif steady:
-            return self._give_whole(part, index, value, plain).copy_to(
-                place, index, names
-            )
+            point = self._give_whole(part, index, value, found, plain)
+            return point.copy_to(place, index, names)
         else:
             source = source_of(value)
-            base = self.find_held(source, here)
-            point = base or self._give_whole(part, index, source, plain)
+            known, base = self.find_held(source, here), self.value(source, plain)
+            point = known or self._give_whole(part, index, source, base, plain)
             point = point.copy_to(place, index, own)
-        found = self.evaluate_components(part, value, here)
-        numbers = [Component(*one, here.file, here.row) for one in found]
+        parts = self.list_components(part, found)
+        numbers = [Component(*one, here.file, here.row) for one in parts]
         return point.with_components(numbers, names)
 
     def _give_whole(
         self, part: PointPart, index: tuple[int, ...], value: ir.Operand | None,
-        here: Scope,
+        base: Value | None, here: Scope,
     ) -> AssignedPoint:  # fmt: skip
-        """Return what a point holds that is given what no assignment changes."""
-        base, goal, type_ = self.value(value, here), None, self.type_of(part.place)
+        """Return what a point holds that is given what no assignment changes.
+
+        Args:
+            part: The point.
+            index: .. of an array.
+            value: What it is given.
+            base: .. and what that is.
+            here: The assignment.
+        """
+        goal, type_ = None, self.type_of(part.place)
         if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
             base = None
         if value is not None and self.reader and type_ in self.targets:

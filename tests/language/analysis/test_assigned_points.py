@@ -11,6 +11,7 @@ from postproc.language.analysis.assigned_points import (
     Component,
     Scope,
 )
+from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import WrittenNumber
 from postproc.language.visits import Meaning
 from tests.language.krl.test_visits import DATA, job
@@ -82,3 +83,21 @@ def test_a_point_is_assigned_once_and_each_move_takes_of_it_what_it_can():
     assert "the move to it is no PTP" in told[3]
     meanings = [Meaning.POSE, Meaning.UNKNOWN, Meaning.JOINTS, Meaning.UNKNOWN]
     assert v.target.meaning.tolist() == meanings
+
+
+def test_functions_within_functions_cost_what_their_depth_does(monkeypatch):
+    calls, real = [], TaskSymbols.value
+
+    def value(self, *given):
+        calls.append(given)
+        return real(self, *given)
+
+    monkeypatch.setattr(TaskSymbols, "value", value)
+    more = "VAR robtarget q;FUNC robtarget f(robtarget a) RETURN Offs(a,0,0,1); ENDFUNC"
+    counts = []
+    for depth in (3, 5, 7):
+        calls.clear()
+        move = f"q:={'f(' * depth}q{')' * depth};"
+        task("q:=p1;", move, L.format("q"), more=more)
+        counts.append(len(calls))
+    assert counts[2] < 5 * counts[1] < 25 * counts[0]
