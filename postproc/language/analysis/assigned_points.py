@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from postproc.language import ir
+from postproc.language.analysis.found_goals import FoundGoal
 from postproc.language.analysis.shared_map import SharedMap
+from postproc.language.analysis.values import Value
 
 Place = tuple[int, str, str, str]
 """File, module and routine that declare data, "" for none, and their name."""
@@ -37,18 +39,18 @@ class AssignedPoint:
 
     Attributes:
         place: File, module and routine that declare the point, and its name.
-        operand, scope: What it is given whole, None where that is not known, and where
-            that stands.
         index: Of the element, () for a point.
+        base: What it is given whole, None where that is not known.
+        goal: Where a move to that leads, None where it is no point, or not given whole.
         components: What is set in it by itself since then, by name.
         copied: Points that it is a copy of, by their places.
         names: Of all data that its value depends on.
     """
 
     place: Place
-    operand: ir.Operand | None
-    scope: Scope
     index: tuple[int, ...] = ()
+    base: Value | None = None
+    goal: FoundGoal | None = None
     components: tuple[Component, ...] = ()
     copied: frozenset[Place] = frozenset()
     names: frozenset[str] = frozenset()
@@ -67,6 +69,14 @@ class AssignedPoint:
     def chain(self) -> list[Place]:
         """Its place, and the places of what it is a copy of."""
         return [self.place, *sorted(self.copied - {self.place})]
+
+    def copy_to(
+        self, place: Place, index: tuple[int, ...], names: frozenset[str]
+    ) -> AssignedPoint:
+        """Return what another point holds that is given it, and depends on data."""
+        copied = (self.copied | {self.place}) - {place}
+        names = self.names | names
+        return replace(self, place=place, index=index, copied=copied, names=names)
 
     def with_components(
         self, found: Iterable[Component], names: frozenset[str]

@@ -1,23 +1,26 @@
-"""What moves are carried out with, as a table: many visits share few conditions."""
+"""What moves are carried out with: many visits share few conditions."""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from operator import attrgetter
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Indices, Interned, is_one_value, slim
+from postproc.diagnostics import NO_REASON, Reason
 from postproc.language import visits
 from postproc.language.shifts import Pose, flat
 from postproc.robot.pose import pose_from_record
 
 _DTYPES: Mapping[Any, Any] = {"Floats": float, "Bools": bool, "Ints": np.int8}
 P = TypeVar("P", bound=visits.VisitPart)
+M = TypeVar("M", bound="ModalState")
 NO_LOAD: tuple[float, ...] = (math.nan,) * 4  # one object: NaN differs from itself
 
 
@@ -30,6 +33,27 @@ def compose_poses(first: Pose, second: Pose) -> Pose:
 def cell_pose(record: Sequence[float] | None) -> Pose:
     """Take a position record [mm, deg] over from the cell."""
     return flat(pose_from_record(np.array(record, float))) if record else ()
+
+
+@dataclass(frozen=True)
+class TaskFrame:
+    """A tool, or a base, as a program sets it.
+
+    Attributes:
+        pose: Where it is; empty where that is not known.
+        why: Why targets with it cannot be compensated.
+        taught: It was taught with the arm, and contains its error.
+        remote: It is one of a tool that stands still, or of a part that the arm holds;
+            controllers may differ in which of the two frames they take for it then.
+        load: Of a tool: mass [kg] and its centre in the flange frame [mm]; empty where
+            it states none, or none that is known.
+    """
+
+    pose: Pose
+    why: Reason = NO_REASON
+    taught: bool = False
+    remote: bool = False
+    load: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,3 +164,42 @@ def _number(poses: Interned[tuple[Pose, bool]], held: Conditions) -> list[int]:
     """Number the frames of conditions, -1 for those that are not known."""
     frames = zip((held.tool, held.base, held.uframe), held.taught, strict=True)
     return [poses[pose, taught] if pose else -1 for pose, taught in frames]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModalState(ABC):
+    """What holds until another statement changes it; a language adds its own.
+
+    Attributes:
+        collected: Names of sets that grow where ways meet, and are never forgotten.
+        blocked: Why no target can be compensated; more than one reason.
+    """
+
+    collected: ClassVar[tuple[str, ...]] = ("blocked",)
+    blocked: frozenset[Reason] = frozenset()
+
+    @abstractmethod
+    def unknown_state(self: M) -> M:
+        """Return it where nothing is known."""
+
+    def with_(self: M, **changed: Any) -> M:
+        """Return it with other values; itself where they are no others."""
+        same = all(getattr(self, name) is value for name, value in changed.items())
+        return self if same else replace(self, **changed)
+
+    def join(self: M, other: M) -> M:
+        """Keep what is the same on another way here."""
+        lost = self.unknown_state()
+        found = {
+            f.name: getattr(lost, f.name)
+            for f in fields(self)
+            if getattr(self, f.name) != getattr(other, f.name)
+        }
+        for name in self.collected:
+            found[name] = getattr(self, name) | getattr(other, name)
+        return replace(self, **found)
+
+    def forget(self: M) -> M:
+        """Forget all but why targets cannot be compensated."""
+        kept = {name: getattr(self, name) for name in self.collected}
+        return replace(self.unknown_state(), **kept)

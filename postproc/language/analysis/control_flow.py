@@ -9,7 +9,7 @@ from typing import Any
 from postproc.language import ir
 
 EXIT = "exit-loop"
-_ENDS = {
+ENDS = {
     "if": "endif",
     "while": "endwhile",
     "for": "endfor",
@@ -18,7 +18,7 @@ _ENDS = {
     "repeat": "until",
     "condition": "endcondition",
 }
-CLOSING = frozenset(_ENDS.values())
+CLOSING = frozenset(ENDS.values())
 LOOPS = ("while", "loop", "repeat", "for")
 _DIVIDED_BY = {"else": ("if", "test"), "elseif": ("if",)}  # others divide a test
 CYCLE = "cycle"
@@ -131,7 +131,7 @@ class FlowReader:
             one = one.then or ir.SourceStatement()
         word = self._words[row] = word_of(one)
         self._take_behind(row, one)
-        if word in _ENDS:
+        if word in ENDS:
             self._open.append((row, word))
             self._divisions[row] = []
         elif word in CLOSING:
@@ -154,7 +154,7 @@ class FlowReader:
         """Read what stands behind a statement on its line."""
         behind = getattr(one, "then", None)
         inner = word_of(behind)
-        if inner in _ENDS or inner in CLOSING:
+        if inner in ENDS or inner in CLOSING:
             outer = self.spell(word_of(one)) or type(one).__name__.upper()
             text = f"this {self.spell(inner)} stands behind {outer}"
             self.problems.append((row, f"{text}: put it on a line of its own"))
@@ -163,7 +163,7 @@ class FlowReader:
 
     def _close(self, row: int, word: str) -> None:
         """Close the innermost block."""
-        if not self._open or _ENDS[self._open[-1][1]] != word:
+        if not self._open or ENDS[self._open[-1][1]] != word:
             self._refuse(row, word)
             return
         head, _ = self._open.pop()

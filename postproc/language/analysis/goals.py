@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, ClassVar, TypeVar
 
-from postproc.diagnostics import Code, Reason
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import AssignedPoint, Scope
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundShift,
-    explain_components,
-    hold_numbers,
-    spell_element,
+from postproc.language.analysis.assigned_points import (
+    NO_POINTS,
+    AssignedPoint,
+    Points,
+    Scope,
 )
+from postproc.language.analysis.found_goals import FoundGoal, FoundShift, hold_numbers
+from postproc.language.analysis.origins import Origins
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
+from postproc.robot.trajectory import Motion
 
+MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
 RUN_TIME = "it is known only when the program runs"
 AT_RUN_TIME = Reason(
     Code.RUNTIME_VALUE, "the target is known only when the program runs"
@@ -55,7 +59,7 @@ class ReadShift:
 
 @dataclass(frozen=True)
 class GoalReader(ABC):
-    """Reads the ends of one move.
+    """Reads where moves lead.
 
     Attributes:
         task: What names mean.
@@ -64,6 +68,7 @@ class GoalReader(ABC):
         brackets: Around the index of an element.
         shout: Names are upper case in messages.
         system: Why numbers of files that are not rewritten must stay.
+        outlives: Why those stay that data of no routine are given, "" if they need not.
     """
 
     task: TaskSymbols[Any]
@@ -72,17 +77,23 @@ class GoalReader(ABC):
     brackets: ClassVar[str]
     shout: ClassVar[bool] = False
     system: ClassVar[str]
+    outlives: ClassVar[str] = ""
 
     # What a language says.
 
     @abstractmethod
-    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
-        """Read a point that is known, None where it is none that can be gone to.
+    def visits(self, one: Any, scope: Scope, modes: Any) -> Iterator[Any]:
+        """Read the visits of a move: the point of an arc, and its end.
 
         Args:
-            value: The point.
-            name: Of the point, "" where it is written.
+            one: The move.
+            scope: As `here`, without what points hold.
+            modes: What holds there.
         """
+
+    @abstractmethod
+    def read_value(self, value: Value | None) -> FoundGoal | None:
+        """Read a point that is known, None where it is none that can be gone to."""
 
     @abstractmethod
     def explain_unknown(self, name: str) -> Reason:
@@ -97,17 +108,9 @@ class GoalReader(ABC):
             slot: Its first number, -1 where none is written.
         """
 
-    def is_shared(self, name: str) -> bool:
-        """Return True if other programs may read a point too."""
-        return False
-
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read what only this language can go to, None for all else."""
         return None
-
-    def explain_kept(self, held: AssignedPoint) -> Iterator[str]:
-        """Say why what an assigned point was given must keep its numbers."""
-        return iter(())
 
     def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
         """Return True if all that a move needs of an assigned point is known."""
@@ -178,12 +181,13 @@ class GoalReader(ABC):
     def read_point(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, ir.DataObject) else ""
-        goal = self.read_value(self.task.value(operand, self.here), name)
+        goal = self.read_value(self.task.value(operand, self.here))
         if goal is None:
             why = self.explain_unknown(name) if name else AT_RUN_TIME
             return self.unknown(why, name)
-        if goal.target == Meaning.UNKNOWN:
-            return replace(goal, name=name)
+        partial = goal.why.code is Code.PARTIAL_TARGET  # it may be told elsewhere
+        if goal.target == Meaning.UNKNOWN or (name and partial):
+            return self.unknown(goal.why, name)
         if not (name or goal.slots[0] >= 0):
             return goal
         if goal.slots[0] >= 0 and not self._is_own(goal, operand):
@@ -193,10 +197,10 @@ class GoalReader(ABC):
 
     def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
         """Return the goal of a move that names data, and elements of them."""
-        return replace(
-            goal, name=name + steps, pins=self.explain_pinned(name, goal.point),
-            shared=self.is_shared(name),
-        )  # fmt: skip
+        declared = self.task.datum(name, self.here)
+        shared = declared is not None and declared[1].scope == "global"
+        pins = self.explain_pinned(name, goal.point)
+        return replace(goal, name=name + steps, pins=pins, shared=shared)
 
     def _is_own(self, goal: FoundGoal, operand: ir.Operand | None) -> bool:
         """Return True if all numbers of a point stand in its own statement.
@@ -212,13 +216,15 @@ class GoalReader(ABC):
         if file < 0:
             return False
         first, behind = self.task.files[file].text.first[row : row + 2].tolist()
-        begin = self.task.first_slots[file]
+        begin = self.task.numbering.first[file]
         own = range(begin + first, begin + behind)
         return all(slot in own for slot in goal.slots if slot >= 0)
 
     def is_of_system(self, slot: int) -> bool:
         """Return True if a number stands in a file that is read and not rewritten."""
-        return slot >= 0 and self.task.files[self.task.file_of(slot)].is_system
+        return (
+            slot >= 0 and self.task.files[self.task.numbering.file_of(slot)].is_system
+        )
 
     def _index(self, step: str | ir.ElementStep) -> tuple[int, ...] | None:
         return self.task.index(step, self.here)
@@ -228,25 +234,26 @@ class GoalReader(ABC):
         steps = operand.steps if isinstance(operand, ir.DataObject) else ()
         spelt = ""
         for step in steps:
-            index = ",".join(map(str, self._index(step) or ()))
-            inside = f"{self.brackets[0]}{index}{self.brackets[1]}"
+            inside = self._spell_index(self._index(step) or ())
             spelt += f".{step}" if isinstance(step, str) else inside
         return spelt
+
+    def _spell_index(self, index: tuple[int, ...]) -> str:
+        return f"{self.brackets[0]}{','.join(map(str, index))}{self.brackets[1]}"
 
     # What assignments gave.
 
     def _read_held(self, held: AssignedPoint) -> FoundGoal:
         """Read the destination that assignments gave to a point."""
-        there, name = self.at(held.scope), spell_element(held, self.brackets)
-        goal = self.unknown(AT_RUN_TIME)
-        if held.operand is not None:
-            goal = there.goal(held.operand)
+        name = held.name + (self._spell_index(held.index) if held.index else "")
+        goal = held.goal or self.unknown(AT_RUN_TIME)
         goal = replace(goal, names=goal.names | held.names)
         why = []
         for place in held.chain:
             where = self.at(Scope(*place[:3], row=self.here.row))
             why.append(where.explain_pinned(place[-1], goal.point))
-        why += self.explain_kept(held)
+        of_all = (place[-1] for place in held.chain if self.outlives and not place[2])
+        why += [f"{one} {self.outlives}" for one in of_all]
         pins = next(filter(None, (goal.pins, *why)), "")
         if held.components:
             return self._set_components(held, goal, name, pins)
@@ -256,8 +263,8 @@ class GoalReader(ABC):
         if shift is not None:
             shift = replace(shift, pins=shift.pins or pins)
         doubtful = goal.doubtful
-        if goal.target == Meaning.UNKNOWN and held.operand is not None:
-            doubtful |= self.task.names_of(held.operand)
+        if goal.target == Meaning.UNKNOWN and held.goal is not None:
+            doubtful |= held.names
         return replace(goal, name=name, pins=pins, shift=shift, doubtful=doubtful)
 
     def _set_components(
@@ -265,19 +272,49 @@ class GoalReader(ABC):
     ) -> FoundGoal:
         """Read a point of which components have been set by themselves."""
         value = self.task.evaluate_held(held)
-        found = self.read_value(value, "") or self.unknown(AT_RUN_TIME)
+        found = self.read_value(value) or self.unknown(AT_RUN_TIME)
         partial = found.why.code is Code.PARTIAL_TARGET
         known = found.target != Meaning.UNKNOWN and not partial
         known = known and self.is_followed_whole(held, value)
-        why = explain_components(held, name, self.task.files, known)
+        why = self._explain_components(held, name, known)
         own = found.why.code not in (*_OF_NUMBERS, Code.RUNTIME_VALUE)
-        if held.operand is not None and own:
+        if held.goal is not None and own:
             why = found.why
         if not known:
             return hold_numbers(base, name, why, pins)
         return hold_numbers(
             base, name, why, pins, found.target, found.values, found.aux
         )
+
+    def _explain_components(
+        self, held: AssignedPoint, name: str, known: bool
+    ) -> Reason:
+        """Say which components are set by themselves, and where.
+
+        Args:
+            held: The point.
+            name: As it is spelt.
+            known: All of its numbers are known.
+        """
+        late = [one for one in held.components if one.value is None]
+        meant, files = late or held.components, self.task.files
+        lines = sorted(
+            {(one.file, files[one.file].text.line(one.row)) for one in meant}
+        )
+        places = []
+        for file, rows in groupby(lines, itemgetter(0)):
+            own = [str(line) for _, line in rows][:MOST_NAMED]
+            where = f"line{'s' * (len(own) > 1)} {', '.join(own)}"
+            places.append(f"{where} of {files[file].text.source.name}")
+        parts = ", ".join(one.name for one in meant[:MOST_PARTS])
+        more = len(meant) - MOST_PARTS
+        parts += f" and {more} more" if more > 0 else ""
+        text = f"{name}: {parts} set in {', '.join(places)}"
+        if late:
+            text = f"{text} to what is known only when the program runs"
+        elif not known:
+            text = f"{text}; its other numbers are known only when the program runs"
+        return Reason(Code.COMPUTED_TARGET if known else Code.RUNTIME_VALUE, text)
 
     # Shifts: the point is moved along.
 
@@ -329,3 +366,44 @@ def list_slots(numbers: Sequence[WrittenNumber], width: int) -> tuple[int, ...]:
     if min(slots, default=-1) < 0:
         return (-1,) * width
     return slots + (-1,) * (width - len(slots))
+
+
+@dataclass
+class FoundVisit:
+    """One arrival, as it is found.
+
+    Attributes:
+        scope: Where the move stands.
+        motion, via: `Motion`, and whether it is the point of an arc.
+        goal: Where it goes.
+        modes: What holds there.
+        origins: Where it may come from.
+        why: Why it cannot be compensated.
+        arc_angle: As in `Visits` [rad].
+        block: Tells the curves apart that visits are points of, None for none.
+        curved: As in `Visits`.
+        count: How many moves it stands for that follow each other and differ only in
+            where they go: this one is the first.
+        points: What points hold where it was read.
+        left: With what the program went on behind it the last time: modes, points, and
+            where else the arm may come from.
+    """
+
+    scope: Scope
+    motion: Motion
+    via: bool
+    goal: FoundGoal
+    modes: Any
+    origins: Origins = frozenset()
+    why: Reason = NO_REASON
+    arc_angle: float = math.nan
+    block: Hashable = None
+    curved: bool = False
+    count: int = 1
+    points: Points = NO_POINTS
+    left: tuple[Any, Any, Origins] | None = None
+
+    @property
+    def row(self) -> int:
+        """The row of the move in its file."""
+        return self.scope.row

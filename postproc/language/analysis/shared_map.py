@@ -7,11 +7,11 @@ from typing import Generic, TypeVar
 
 K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
-_COUNT = 256
+_COUNT = 64
 
 
 class SharedMap(Generic[K, T]):
-    """Values by key on 256 shelves; a copy shares a shelf until one side writes to it.
+    """Values by key on 64 shelves; a copy shares a shelf until one side writes to it.
 
     An analysis keeps one copy for every place of a program, and merges copies that
     differ in a few keys of thousands: both cost what differs, not what is held.

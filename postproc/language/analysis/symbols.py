@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -26,13 +24,15 @@ from postproc.language.analysis.assigned_points import (
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
-from postproc.language.analysis.functions import ALIKE, apply_function, apply_operator
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
+    ALIKE,
     KnownRecord,
     Layout,
     Value,
     WrittenNumber,
+    apply_function,
+    apply_operator,
     is_written,
     number_in,
     put_together,
@@ -41,6 +41,8 @@ from postproc.language.analysis.values import (
     take_apart,
     without_places,
 )
+from postproc.language.analysis.visit_columns import Numbering
+from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
@@ -53,33 +55,33 @@ class TaskSymbols(ABC, Generic[F]):
 
     Attributes:
         files: Its files, the one that runs first.
-        taught: Lower-case names of data that were taught with the arm, by the cell.
+        start: What the cell says.
         files_beside: Files of tasks that run at the same time.
         comments: How the language writes them.
         layouts: Components of data by type.
         followed: Types of data whose assignments are followed.
         targets: Those of them whose numbers a move may have written anew.
-        constants: Names that the language gives values to.
         functions: Kinds of routines that return values.
         by_name: Records hold their components by name, not by their order.
         uncertain: Operators whose result kinds of numbers, or controllers, decide.
         apart: Data may be declared in one place and get their first value elsewhere.
         volatile: Names of data that may change at any time, by what runs beside.
+        reader: Reads where moves lead, None where nothing is followed.
     """
 
     files: Sequence[F]
-    taught: Collection[str] = frozenset()
+    start: Start = field(default_factory=Start)
     files_beside: Sequence[F] = ()
     comments: ClassVar[Comments]
     layouts: ClassVar[Mapping[str, Layout]]
     followed: ClassVar[Collection[str]]
     targets: ClassVar[Collection[str]]
-    constants: ClassVar[Mapping[str, float]] = {}
     functions: ClassVar[str]
     by_name: ClassVar[bool] = False
     uncertain: ClassVar[Collection[str]] = ("DIV", "MOD")
     apart: ClassVar[bool] = False
     volatile: frozenset[str] = field(default=frozenset(), init=False)
+    reader: type[Any] | None = field(default=None, init=False)
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
         default_factory=lambda: defaultdict(dict), init=False
     )
@@ -154,6 +156,11 @@ class TaskSymbols(ABC, Generic[F]):
     def unit(self, file: int) -> int:
         """Return the file that stands for all that a file shares its names with."""
         return file
+
+    def controller_data(self, name: str) -> tuple[Value, str] | None:
+        """Return what the controller gives a name, and its type; None for others."""
+        truth = {"true": 1.0, "false": 0.0}.get(name)
+        return None if truth is None else (WrittenNumber(truth), "")
 
     def apply(self, call: ir.FunctionCall, here: Scope, depth: int) -> Value | None:
         """Return what a function of the controller gives, None where not known."""
@@ -282,13 +289,9 @@ class TaskSymbols(ABC, Generic[F]):
         return found
 
     @cached_property
-    def first_slots(self) -> Sequence[int]:
-        """The index of every file's first number among those of the job."""
-        return [0, *accumulate(len(file.text.numbers) for file in self.files)]
-
-    def file_of(self, slot: int) -> int:
-        """Return the file that a number stands in, -1 for none."""
-        return bisect_right(self.first_slots, slot) - 1
+    def numbering(self) -> Numbering:
+        """The statements and numbers of all files, those beside the task the last."""
+        return Numbering([one.text for one in (*self.files, *self.files_beside)])
 
     @cached_property
     def declared(self) -> frozenset[str]:
@@ -516,7 +519,7 @@ class TaskSymbols(ABC, Generic[F]):
         place = self.place(name, here)
         found = self.datum(name, here)
         if found is None:
-            fixed = name in ALIKE or name in self.constants
+            fixed = name in ALIKE or self.controller_data(name) is not None
             return False if place is None and fixed else None
         return False if found[1].kind == "const" else None
 
@@ -540,7 +543,7 @@ class TaskSymbols(ABC, Generic[F]):
             case ir.Num(slot=slot):
                 text = self.files[here.file].text
                 at = int(text.first[here.row]) + slot
-                own = self.first_slots[here.file] + at
+                own = self.numbering.first[here.file] + at
                 return _make_number(float(text.value[at]), own)
             case ir.StringLiteral(text=written):
                 return written
@@ -586,12 +589,13 @@ class TaskSymbols(ABC, Generic[F]):
         whole = _without_components(data)
         held = self.find_held(whole, here)
         if held is not None:
-            value = self.evaluate_held(held, depth)
+            value = self.evaluate_held(held)
             return value, steps[len(whole.steps) :], self.type_of(held.place)
         for _, operand, there in self.find_given(ir.DataObject(name), here):
             return self.value(operand, there, depth + 1), steps, ""
-        if not steps and self.place(name, here) is None and name in self.constants:
-            return WrittenNumber(self.constants[name]), steps, ""
+        own = name in self.declared or name in here.parameters
+        if not own and (given := self.controller_data(name)):
+            return given[0], steps, given[1]
         found = None
         if self.apart and steps and isinstance(steps[0], ir.ElementStep):
             index = self.index(steps[0], here)
@@ -656,17 +660,16 @@ class TaskSymbols(ABC, Generic[F]):
         inside = all(1 <= at <= n for at, n in zip(found, sizes, strict=True))
         return found if inside else None
 
-    def evaluate_components(
-        self, part: PointPart, value: ir.Operand, here: Scope
+    def list_components(
+        self, part: PointPart, found: Value | None
     ) -> Sequence[tuple[str, float | None]]:
         """Return the components that an assignment sets, and what it gives to them.
 
         Args:
             part: What is set.
-            value: What it is given.
-            here: The assignment.
+            found: What it is given.
         """
-        found, type_ = self.value(value, here), self.type_of(part.place)
+        type_ = self.type_of(part.place)
         names = self.spell(type_, part.component)
         if isinstance(found, KnownRecord):
             fitting = found.whole and not part.component and type_ in self.layouts
@@ -680,16 +683,12 @@ class TaskSymbols(ABC, Generic[F]):
         own = (known or names) if self.by_name else (fields or names)
         return [(name, known.get(name)) for name in own]
 
-    def evaluate_held(self, held: AssignedPoint, depth: int = 0) -> Value | None:
+    def evaluate_held(self, held: AssignedPoint) -> Value | None:
         """Evaluate what assignments gave to data, None where it is not known."""
-        type_, base = self.type_of(held.place), None
-        if held.operand is not None:
-            base = self.value(held.operand, held.scope, depth)
-        if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
-            base = None
+        base, layout = held.base, self.layouts.get(self.type_of(held.place), {})
         if not held.components:
             return base
-        names = spell_components(layout := self.layouts.get(type_, {}), "")
+        names = spell_components(layout, "")
         fields = take_apart(base, names)
         for one in held.components:
             fields.pop(one.name, None)
@@ -697,9 +696,8 @@ class TaskSymbols(ABC, Generic[F]):
                 fields[one.name] = WrittenNumber(one.value)
         if self.by_name and layout:
             known = all(one.value is not None for one in held.components)
-            known &= held.operand is None or (
-                isinstance(base, KnownRecord) and base.whole
-            )
+            given = held.goal is not None or base is not None
+            known &= not given or (isinstance(base, KnownRecord) and base.whole)
             return KnownRecord(tuple(fields.items()), known)
         return put_together(fields, layout) if len(fields) >= len(names) else None
 
@@ -711,14 +709,12 @@ class TaskSymbols(ABC, Generic[F]):
         if self.type_of(one.place) not in self.targets:
             mine, theirs = map(without_places, map(self.evaluate_held, (one, other)))
             return mine is not None and mine == theirs
-        if (one.copied, one.operand is None) != (other.copied, other.operand is None):
+        if (one.copied, one.goal is None) != (other.copied, other.goal is None):
             return False
         parts = [[(c.name, c.value) for c in p.components] for p in (one, other)]
         if parts[0] != parts[1] or any(value is None for _, value in parts[0]):
             return False
-        bases = (self.evaluate_held(replace(p, components=())) for p in (one, other))
-        mine, theirs = bases
-        return mine == theirs and (mine is None or is_written(mine))
+        return one.base == other.base and (one.base is None or is_written(one.base))
 
     def names_of(self, operand: ir.Operand) -> frozenset[str]:
         """Return the names of all data and functions in an operand."""
@@ -764,34 +760,50 @@ class TaskSymbols(ABC, Generic[F]):
         self, part: PointPart, index: tuple[int, ...], value: ir.Operand, here: Scope,
     ) -> AssignedPoint:  # fmt: skip
         """Return what a point holds that is given a value, or a component of it."""
-        place, points, own = part.place, here.points, frozenset([part.place[-1]])
-        plain = replace(here, points=NO_POINTS)
-        known = self.find_held(value, here)
-        if known is not None and not part.component:
-            copied = (known.copied | {known.place}) - {place}
-            return replace(
-                known, place=place, index=index, copied=copied, names=known.names | own
-            )
-        inside = self._points_in(value, here)
-        names = self.names_of(value).union(own, *(point.names for point in inside))
-        if not part.component and self._is_steady(value, here):
-            return AssignedPoint(place, value, plain, index, names=names)
-        found = self.evaluate_components(part, value, here)
-        numbers = [
-            Component(name, number, here.file, here.row) for name, number in found
-        ]
+        place, own = part.place, frozenset([part.place[-1]])
+        known = None if part.component else self.find_held(value, here)
+        if known is not None:
+            return known.copy_to(place, index, own)
+        wholes = map(_without_components, ir.data_in(value))
+        inside = [held for one in wholes if (held := self.find_held(one, here))]
+        plain, names = replace(here, points=NO_POINTS), self.names_of(value)
+        found, given = self.value(value, here), [one[0] for one in here.given]
+        steady = not (inside or self.calls_routine(value)) and names.isdisjoint(given)
+        steady = steady or not here.points.routines or found == self.value(value, plain)
+        names = names.union(own, *(point.names for point in inside))
         if part.component:
-            before = points.held.get((place, index))
-            point = before or AssignedPoint(place, None, plain, index)
-            return point.with_components(numbers, names)
-        source = source_of(value)
-        base = self.find_held(source, here)
-        if base is None:
-            point = AssignedPoint(place, source, plain, index)
+            point = here.points.held.get((place, index)) or AssignedPoint(place, index)
+        elif steady:
+            point = self._give_whole(part, index, value, found, plain)
+            return point.copy_to(place, index, names)
         else:
-            copied = (base.copied | {base.place}) - {place}
-            point = replace(base, place=place, index=index, copied=copied)
+            source = source_of(value)
+            known, base = self.find_held(source, here), self.value(source, plain)
+            point = known or self._give_whole(part, index, source, base, plain)
+            point = point.copy_to(place, index, own)
+        parts = self.list_components(part, found)
+        numbers = [Component(*one, here.file, here.row) for one in parts]
         return point.with_components(numbers, names)
+
+    def _give_whole(
+        self, part: PointPart, index: tuple[int, ...], value: ir.Operand | None,
+        base: Value | None, here: Scope,
+    ) -> AssignedPoint:  # fmt: skip
+        """Return what a point holds that is given what no assignment changes.
+
+        Args:
+            part: The point.
+            index: .. of an array.
+            value: What it is given.
+            base: .. and what that is.
+            here: The assignment.
+        """
+        goal, type_ = None, self.type_of(part.place)
+        if isinstance(base, WrittenNumber) and not self.fits(type_, "", base.value):
+            base = None
+        if value is not None and self.reader and type_ in self.targets:
+            goal = self.reader(self, here).goal(value)
+        return AssignedPoint(part.place, index, base, goal)
 
     def find_returned(
         self, call: ir.FunctionCall, here: Scope
@@ -828,21 +840,6 @@ class TaskSymbols(ABC, Generic[F]):
                 return None
             points = self.assign(points, one, scope)
         return None
-
-    def _points_in(self, value: ir.Operand, here: Scope) -> list[AssignedPoint]:
-        """List what assignments gave to data, or elements, that a value names."""
-        if not here.points.routines:
-            return []
-        wholes = map(_without_components, ir.data_in(value))
-        found = (self.find_held(data, here) for data in wholes)
-        return [one for one in found if one is not None]
-
-    def _is_steady(self, value: ir.Operand, here: Scope) -> bool:
-        """Return True if no assignment on the way changes what a value is."""
-        if not here.points.routines:
-            return True
-        plain = self.value(value, replace(here, points=NO_POINTS))
-        return self.value(value, here) == plain
 
 
 def _without_components(data: ir.DataObject) -> ir.DataObject:

@@ -110,14 +110,14 @@ class TaskLanguage(Language):
             raise ProgramError(own[0].name, problem, self.cure)
         self.refuse(files)
         beside = [read_once(one, known, self.read_file) for one in others]
-        return self.task(files, start.taught, beside)
+        return self.task(files, start, beside)
 
     def read(
         self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
     ) -> JobReading:
         """Read the files of a job and follow it, see `Language.read`."""
         task = self.parse(sources, start, known)
-        machine = follow(self.machine, task, start)
+        machine = follow(self.machine, task)
         collector = self.collector(machine)
         visits = collector.collect()
         own = (f.moves[: 0 if f.is_system else None] for f in task.files)

@@ -7,7 +7,6 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -24,6 +23,7 @@ from postproc.language.analysis.control_flow import (
     is_structural,
 )
 from postproc.language.analysis.declarations import TaskRoutine
+from postproc.language.analysis.goals import GoalReader
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
     Interpreter,
@@ -38,7 +38,6 @@ from postproc.language.analysis.origins import (
     join_origins,
 )
 from postproc.language.analysis.symbols import TaskSymbols
-from postproc.language.language import Start
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
@@ -151,8 +150,8 @@ class TaskMachine(Interpreter[Arrived]):
         acting: Statements that move, call, or change what moves are made with; they
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
+        reader: Reads where moves lead.
         task: What its names mean.
-        start: What the cell says.
         diagnostics: What else was found.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
@@ -162,8 +161,8 @@ class TaskMachine(Interpreter[Arrived]):
     procedures: ClassVar[Collection[str]]
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
+    reader: ClassVar[type[GoalReader]]
     task: TaskSymbols[Any] = field(kw_only=True)
-    start: Start = field(kw_only=True)
     diagnostics: set[Diagnostic] = field(default_factory=set)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
     at_once: bool = True
@@ -181,10 +180,14 @@ class TaskMachine(Interpreter[Arrived]):
         default_factory=dict
     )
 
-    @cached_property
-    def texts(self) -> Sequence[StatementText[Any]]:
+    def __post_init__(self) -> None:
+        """Let assignments read where moves to points lead."""
+        self.task.reader = self.reader
+
+    @property
+    def texts(self) -> Sequence[Any]:
         """The statements of all files, the main one first."""
-        return [file.text for file in (*self.task.files, *self.task.files_beside)]
+        return self.task.numbering.texts
 
     # What a language says.
 
@@ -213,11 +216,6 @@ class TaskMachine(Interpreter[Arrived]):
     @abstractmethod
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
-
-    @property
-    @abstractmethod
-    def goals(self) -> Any:
-        """What reads the visits of moves."""
 
     @abstractmethod
     def is_move(self, one: ir.SourceStatement) -> bool:
@@ -339,8 +337,8 @@ class TaskMachine(Interpreter[Arrived]):
         if not self.is_move(one):
             return ()
         modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
-        found: Iterable[Any] = self.goals.visits(one, scope, modes, points)
-        return found
+        there = replace(scope, points=points) if points.routines else scope
+        return self.reader(self.task, there).visits(one, scope, modes)
 
     # From statement to statement, see `Interpreter`.
 
@@ -443,11 +441,11 @@ class TaskMachine(Interpreter[Arrived]):
 
     def declares_motionless(self, name: str) -> bool:
         """Tell whether the cell says that a routine neither moves nor sets frames."""
-        return self.start.effect_of(name) == "motionless"
+        return self.task.start.effect_of(name) == "motionless"
 
     def outside(self, at: At, name: str, here: Arrived) -> Arrived:
         """Call a routine that is not at hand: the cell may say what it does."""
-        said_of_it = self.start.effect_of(name)
+        said_of_it = self.task.start.effect_of(name)
         if said_of_it in ("moves", "sets-frames"):
             self.lost |= here.origins
         if said_of_it == "moves":
@@ -518,8 +516,8 @@ class TaskMachine(Interpreter[Arrived]):
             caller: Where the call stands, None where nothing calls it.
             here: How the arm comes to it.
         """
-        file, module, routine = found
-        at = self.offsets[file] + routine.first if caller is None else caller.job_row
+        (file, module, routine), rows = found, self.task.numbering.rows
+        at = rows[file] + routine.first if caller is None else caller.job_row
         around = self.root if caller is None else caller.context
         context = around.find(at, CALLED)
         if context is None:
@@ -544,7 +542,8 @@ class TaskMachine(Interpreter[Arrived]):
         if caller and (call := self._call_of(found, caller)) is not None:
             scope = self._bind(found, call, scope_at(caller))
         scope = scope or self.task.scope_of(found)
-        return TaskPlace(scope, found, self._flows[key], text, self.offsets[file])
+        first = self.task.numbering.rows[file]
+        return TaskPlace(scope, found, self._flows[key], text, first)
 
     def _bind(
         self, routine: TaskRoutine, call: ir.Instruction, there: Scope
@@ -593,11 +592,6 @@ class TaskMachine(Interpreter[Arrived]):
             found = bool(routine.rows.head.parameters) and own in called
             self._recursive[routine.key] = found
         return self._recursive[routine.key]
-
-    @cached_property
-    def offsets(self) -> Sequence[int]:
-        """The job-wide index of the first row of every file."""
-        return [0, *accumulate(len(text) + 1 for text in self.texts)]
 
     def arrive(self, at: At, one: ir.SourceStatement, here: Arrived) -> Arrived:
         """Record the visits of a move; the arm then stands at the last.
@@ -816,14 +810,14 @@ def scope_at(at: At, here: Arrived | None = None) -> Scope:
     return scope
 
 
-def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
+def follow(kind: type[M], task: TaskSymbols[Any]) -> M:
     """Make a machine and run it.
 
     It runs again where data turn out to change in ways that are not followed.
     Where anything runs beside the program another one reads each move by itself: what
     runs beside may be one of several that were read at once.
     """
-    machine = kind(task=task, start=start)
+    machine = kind(task=task)
     task.volatile = machine.list_changed_beside()
     machine.run()
     while True:
@@ -833,6 +827,6 @@ def follow(kind: type[M], task: TaskSymbols[Any], start: Start) -> M:
             break
         task.volatile |= changed
         at_once = machine.at_once and not machine.beside
-        machine = kind(task=task, start=start, at_once=at_once)
+        machine = kind(task=task, at_once=at_once)
         machine.run()
     return machine

@@ -16,7 +16,6 @@ from collections.abc import (
     Set,
 )
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,12 +26,8 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import visits
 from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.conditions import Conditions, Zone
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundVisit,
-    array_of,
-    whole_name,
-)
+from postproc.language.analysis.found_goals import FoundGoal, array_of, whole_name
+from postproc.language.analysis.goals import FoundVisit
 from postproc.language.analysis.move_runs import within
 from postproc.language.analysis.origins import Origins, number_origins
 from postproc.language.analysis.task_machine import TaskMachine
@@ -46,7 +41,7 @@ from postproc.language.analysis.visit_columns import (
 )
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import MEASURE
-from postproc.language.text.statement_table import Statements, StatementText
+from postproc.language.text.statement_table import StatementText
 
 ONLY_SHIFTED = Reason(
     Code.NUMBERS_NOT_OWN,
@@ -118,16 +113,15 @@ class Collector:
 
     Attributes:
         machine: It has followed all ways.
-        texts: All files.
+        numbering: The numbers of all files.
         found: What it has found.
         counts, begin: How many visits each stands for, and the first of them, (r,).
         last: The last of them, by the number that the machine knows it by, (r,).
-        numbering: The numbers of all files.
     """
 
-    def __init__(self, machine: Any, texts: Iterable[Statements[Any]]) -> None:
+    def __init__(self, machine: Any, numbering: Numbering) -> None:
         """Sort what was found."""
-        self.machine, self.texts = machine, [*texts]
+        self.machine, self.numbering = machine, numbering
         keys = [(Point(context, at), k) for context, at, k in machine.keys]
         order = sorted(range(len(keys)), key=keys.__getitem__)
         self.found: list[Any] = [machine.visits[k] for k in order]
@@ -135,8 +129,6 @@ class Collector:
         self.begin = np.cumsum(self.counts) - self.counts
         self.last = np.empty(len(order), np.int64)
         self.last[order] = self.begin + self.counts - 1
-        pairs = [(text.source, text.numbers) for text in self.texts]
-        self.numbering = Numbering.of(pairs)
 
     def origins_of(self, one: Any) -> Origins:
         """Return where the arm may come from before what was found."""
@@ -159,22 +151,17 @@ class Collector:
         Args:
             moves: Rows of the moves of every file.
         """
-        missed = [np.zeros(len(text), bool) for text in self.texts]
+        texts = self.numbering.texts
+        missed = [np.zeros(len(text), bool) for text in texts]
         for own, rows in zip(missed, moves, strict=False):
             own[rows] = True
         for file, visited in map(self.rows_of, self.found):
             missed[file][visited] = False
         lines = (
-            np.unique(t.begin_line[own])
-            for t, own in zip(self.texts, missed, strict=True)
+            np.unique(t.begin_line[own]) for t, own in zip(texts, missed, strict=True)
         )
-        found = zip(self.files, lines, strict=True)
+        found = zip(self.numbering.names, lines, strict=True)
         return {name: own.astype(np.int64) for name, own in found if len(own)}
-
-    @cached_property
-    def files(self) -> list[str]:
-        """The names of the files."""
-        return [text.source.name for text in self.texts]
 
 
 def find_measured(
@@ -208,7 +195,7 @@ class TaskCollector(Collector, ABC):
 
     def __init__(self, machine: Any) -> None:
         """Find what counts for several: it is filled for all of them."""
-        super().__init__(machine, machine.texts)
+        super().__init__(machine, machine.task.numbering)
         self.owner, self.inside = within(self.counts)  # of each visit: (n,)
         first = dict[int, int]()  # by the numbers that moves write
         for k, v in enumerate(self.found):
@@ -237,7 +224,8 @@ class TaskCollector(Collector, ABC):
         pinned = self._find_pinned([*_goals_beside(machine)])
         self._hold_for_taught(pinned)
         return to_visits(
-            c, self.files, self.graph(), self._pin(literals, literal, pinned), literal,
+            c, self.numbering.names, self.graph(),
+            self._pin(literals, literal, pinned), literal,
             own[np.maximum(followed, -1)][self.owner], self.dialect,
         )  # fmt: skip
 
@@ -286,7 +274,7 @@ class TaskCollector(Collector, ABC):
                 c.slots[rows.start, is_written] = own[is_written]
                 continue
             text = self.machine.texts[v.scope.file]
-            base = self.machine.task.first_slots[v.scope.file]
+            base = self.numbering.first[v.scope.file]
             stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
             steps = stride * np.arange(v.count)
             for at in np.flatnonzero(is_written).tolist():  # one by one: short of room
@@ -400,7 +388,7 @@ class TaskCollector(Collector, ABC):
 
     def _find_taught(self) -> list[bool]:
         """Tell which go to taught points, or to targets shifted from one, (r,)."""
-        taught = self.machine.start.taught
+        taught = self.machine.task.start.taught
         if not (any(self.machine.task.taught_lines) or taught):
             return [False] * len(self.found)
         goals = [v.goal for v in self.found]
@@ -470,7 +458,7 @@ def _find_marked(places: Collection[int], machine: TaskMachine) -> set[int]:
     It speaks of those whose numbers stand on its line; where none do, of all in its
     statement.
     """
-    found, begins = set[int](), machine.task.first_slots
+    found, begins = set[int](), machine.task.numbering.first
     for file, lines in enumerate(machine.task.taught_lines):
         text, (begin, behind) = machine.texts[file], begins[file : file + 2]
         inside = (slot - begin for slot in places if begin <= slot < behind)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from functools import cached_property
+from itertools import accumulate, chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -25,7 +27,7 @@ from postproc.language import visits
 from postproc.language.analysis.conditions import ConditionColumns, Conditions
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
-from postproc.language.text.source import NumberSpans, Source
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
 
 TOO_COMPLEX = Reason(Code.TOO_COMPLEX, "the program is too complex to be followed")
@@ -173,28 +175,36 @@ def chain_visits(counts: Ints, origins: Sequence[Sequence[int]]) -> visits.Graph
 
 @dataclass(frozen=True)
 class Numbering:
-    """All numbers of all files of a job.
+    """All statements and numbers of all files of a job.
 
     Attributes:
-        sources: The files.
-        first: Index of each file's first number, and how many there are, (f + 1,).
-        numbers: Where every file's numbers stand.
+        texts: The files.
     """
 
-    sources: tuple[Source, ...]
-    first: Indices
-    numbers: tuple[NumberSpans, ...]
+    texts: Sequence[Statements[Any]]
 
-    @staticmethod
-    def of(texts: Sequence[tuple[Source, NumberSpans]]) -> Numbering:
-        """Number the numbers of files in their order."""
-        sources, numbers = zip(*texts, strict=True)
-        first = np.cumsum([0, *map(len, numbers)]).astype(np.int64)
-        return Numbering(sources, first, numbers)
+    @cached_property
+    def first(self) -> Sequence[int]:
+        """Index of each file's first number, and how many there are, f + 1."""
+        return [0, *accumulate(len(text.numbers) for text in self.texts)]
+
+    @cached_property
+    def rows(self) -> Sequence[int]:
+        """Index of each file's first row: one more than it has belongs to each."""
+        return [0, *accumulate(len(text) + 1 for text in self.texts)]
+
+    @cached_property
+    def names(self) -> Sequence[str]:
+        """The names of the files."""
+        return [text.source.name for text in self.texts]
 
     def __len__(self) -> int:
         """Return how many numbers there are."""
-        return int(self.first[-1])
+        return self.first[-1]
+
+    def file_of(self, slot: int) -> int:
+        """Return the file that a number stands in, -1 for none."""
+        return bisect_right(self.first, slot) - 1
 
     def file(self, slots: Indices) -> Indices:
         """Return the file of every number."""
@@ -219,7 +229,7 @@ class Numbering:
             mine = slots >= 0
             mine[file != number] = False
             own = slots[mine] - self.first[number]
-            numbers = self.numbers[number]
+            numbers = self.texts[number].numbers
             start[mine], end[mine] = numbers.starts(own), numbers.ends(own)
         return visits.NumberPlaces.of(start, end)
 
@@ -230,7 +240,7 @@ class Numbering:
             slots: Numbers of each target, (k, w), -1 for what is not written.
         """
         found = np.zeros(len(slots), dtype=bool)
-        for k in chunks(len(slots) if len(self.sources) > 1 else 0):
+        for k in chunks(len(slots) if len(self.texts) > 1 else 0):
             file = self.file(slots[k])
             found[k] = any_in_rows((file != file[:, :1]) & (slots[k] >= 0))
         return found
@@ -304,10 +314,9 @@ def _literals(
     file = numbering.file(slots[:, 0])
     places = numbering.places(slots, file)
     line = np.zeros(len(slots), dtype=np.int32)
-    for i, source in enumerate(numbering.sources):
+    for i, text in enumerate(numbering.texts):
         mine = file == i
-        first = places.first[mine]
-        line[mine] = source.lines_of(first)
+        line[mine] = text.source.lines_of(places.first[mine])
     own, unnamed = columns.name[visit].astype(np.int64), visits.texts_of(len(slots), {})
     return visits.Literals(
         file=slim(file),

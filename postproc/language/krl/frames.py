@@ -8,41 +8,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
-from postproc.language.analysis.conditions import compose_poses
+from postproc.language.analysis.conditions import TaskFrame, compose_poses
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
 
-
-@dataclass(frozen=True)
-class KrlFrame:
-    """A tool or a base.
-
-    Attributes:
-        pose: Where it is.
-        why: Why targets with it cannot be compensated.
-        taught: It was taught with the arm, and contains its error.
-        remote: It was set for a tool that stands still; controllers differ in which
-            of the two frames they take for it then.
-    """
-
-    pose: Pose
-    why: Reason = NO_REASON
-    taught: bool = False
-    remote: bool = False
+ZERO = TaskFrame(IDENTITY)
 
 
-ZERO = KrlFrame(IDENTITY)
-
-
-def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> KrlFrame:
+def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> TaskFrame:
     """Return a frame that is not known, and why."""
-    return KrlFrame((), Reason(code, text))
+    return TaskFrame((), Reason(code, text))
 
 
 NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
@@ -70,11 +51,11 @@ class FrameReader:
 
     task: KrlTask
     here: Scope
-    tool: KrlFrame
-    base: KrlFrame
+    tool: TaskFrame
+    base: TaskFrame
     store: Mapping[str, object] = field(default_factory=dict)
 
-    def frame(self, operand: ir.Operand) -> KrlFrame:
+    def frame(self, operand: ir.Operand) -> TaskFrame:
         """Read a frame."""
         match operand:
             case ir.DataObject(name="$nullframe" | "$world", steps=()):
@@ -98,7 +79,7 @@ class FrameReader:
             case _:
                 return self._record(operand)
 
-    def _call(self, name: str, arguments: Sequence[ir.Operand | None]) -> KrlFrame:
+    def _call(self, name: str, arguments: Sequence[ir.Operand | None]) -> TaskFrame:
         """Read a frame that one of the functions of modern inline forms gives."""
         first = arguments[0] if arguments else None
         value = self.task.value(first, self.here)
@@ -115,7 +96,7 @@ class FrameReader:
                 return no_frame(_CHAINED.format(name.upper()), Code.EXTERNAL_AXES)
         return no_frame(f"what {name.upper()} gives is not known")
 
-    def read_numbered(self, name: str, number: float) -> KrlFrame:
+    def read_numbered(self, name: str, number: float) -> TaskFrame:
         """Return the tool or the base that BAS sets for a number; 0 is none."""
         entry, table = whole(number), TABLES[name]
         if entry is None:
@@ -128,7 +109,7 @@ class FrameReader:
         )
         return self._product(self._product(first, found), second)
 
-    def _correction(self, name: str, frame: str, switch: str) -> KrlFrame:
+    def _correction(self, name: str, frame: str, switch: str) -> TaskFrame:
         """Return a frame that BAS links to an entry, no shift where it does not."""
         on = self._read_held(switch, switch)
         if on is None:
@@ -139,11 +120,11 @@ class FrameReader:
         shown = name.upper()
         if on is not True:
             return no_frame(_MAY_BE_ON.format(switch.upper(), frame.upper(), shown))
-        if isinstance(found, KrlFrame):
+        if isinstance(found, TaskFrame):
             return found
         return no_frame(_CORRECTED.format(frame.upper(), shown))
 
-    def entry(self, table: str, number: int) -> KrlFrame:
+    def entry(self, table: str, number: int) -> TaskFrame:
         """Read an entry of TOOL_DATA or BASE_DATA."""
         shown = f"{table.upper()}[{number}]"
         if number <= 0:
@@ -152,12 +133,12 @@ class FrameReader:
             chain = _CHAINED.format(f"MACHINE_FRAME_DAT[{number}]")
             return no_frame(chain, Code.EXTERNAL_AXES)
         found = self._element(table, number)
-        return found or KrlFrame((), self._unknown(shown, table))
+        return found or TaskFrame((), self._unknown(shown, table))
 
-    def _element(self, table: str, number: int) -> KrlFrame | None:
+    def _element(self, table: str, number: int) -> TaskFrame | None:
         """Read an element of an array of frames, None where it is not known."""
         held = self._read_held(table, symbols.entry_name(table, number))
-        if isinstance(held, KrlFrame) and self.task.is_global(table, self.here):
+        if isinstance(held, TaskFrame) and self.task.is_global(table, self.here):
             return held
         if not self.task.is_steady(table, number):
             return None
@@ -165,7 +146,9 @@ class FrameReader:
         pose = pose_of(self.task.entry(table, number, self.here))
         if found is None or not pose:
             return None
-        return KrlFrame(pose, taught=self.task.is_taught(table, found[0], found[1].row))
+        return TaskFrame(
+            pose, taught=self.task.is_taught(table, found[0], found[1].row)
+        )
 
     def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
@@ -186,7 +169,7 @@ class FrameReader:
         where = f" ({CONFIG}.dat)" if code is Code.UNDECLARED_VARIABLE else ""
         return Reason(code, f"{shown} {text}{where}")
 
-    def _record(self, operand: ir.Operand) -> KrlFrame:
+    def _record(self, operand: ir.Operand) -> TaskFrame:
         """Read a frame that is written or named."""
         value = self.task.value(operand, self.here)
         pose = pose_of(value)
@@ -194,21 +177,21 @@ class FrameReader:
             taught, found = False, self.task.datum(operand.name, self.here)
             if found is not None:
                 taught = self.task.is_taught(operand.name, found[0], found[1].row)
-            return KrlFrame(pose, taught=taught)
+            return TaskFrame(pose, taught=taught)
         if pose:
             taught = self.task.is_taught("", self.here.file, self.here.row)
-            return KrlFrame(pose, taught=taught)
+            return TaskFrame(pose, taught=taught)
         if isinstance(operand, ir.DataObject):
-            return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
+            return TaskFrame((), self._unknown(operand.name.upper(), operand.name))
         return no_frame("a frame is not written whole")
 
     @staticmethod
-    def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:
+    def _product(first: TaskFrame, second: TaskFrame) -> TaskFrame:
         if first.why or second.why or not (first.pose and second.pose):
-            return KrlFrame((), first.why or second.why)
+            return TaskFrame((), first.why or second.why)
         if ZERO in (first, second):
             return second if first == ZERO else first
-        return KrlFrame(
+        return TaskFrame(
             compose_poses(first.pose, second.pose),
             taught=first.taught or second.taught,
             remote=first.remote or second.remote,
@@ -225,7 +208,7 @@ def pose_of(value: object) -> Pose:
     return flat(pose_encoding.KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))
 
 
-def six_numbers(frame: KrlFrame) -> list[float]:
+def six_numbers(frame: TaskFrame) -> list[float]:
     """Return X, Y, Z [mm] and A, B, C [deg] of a frame."""
     return pose_encoding.numbers_of(np.array(frame.pose).reshape(4, 4))
 
@@ -235,7 +218,7 @@ UPRIGHT = 1e-6  # cosine of B up to which A and C are not told apart
 
 def set_component(
     held: object, name: str, value: float
-) -> KrlFrame | KnownRecord | None:
+) -> TaskFrame | KnownRecord | None:
     """Return a frame of which one component is set, a record where not all are known.
 
     Args:
@@ -244,7 +227,7 @@ def set_component(
         value: Its number [mm, deg], NaN where only the run tells it.
     """
     fields = dict[str, Value]()
-    if isinstance(held, KrlFrame) and held.pose:
+    if isinstance(held, TaskFrame) and held.pose:
         numbers = six_numbers(held)
         upright = abs(math.cos(math.radians(numbers[4]))) < UPRIGHT
         known = zip(pose_encoding.COMPONENTS[:6], numbers, strict=True)
@@ -260,5 +243,5 @@ def set_component(
     pose = pose_of(record)
     if not pose:
         return record
-    frame = held if isinstance(held, KrlFrame) else ZERO
+    frame = held if isinstance(held, TaskFrame) else ZERO
     return replace(frame, pose=pose)

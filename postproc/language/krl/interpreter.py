@@ -12,7 +12,7 @@ from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
-from postproc.language.analysis.conditions import cell_pose
+from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
@@ -23,7 +23,6 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modal_state import (
     HALTING,
     HARMLESS,
@@ -31,7 +30,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoals, own_numbers
+from postproc.language.krl.moves import KrlGoal, own_numbers
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -87,6 +86,7 @@ class KrlMachine(TaskMachine):
     """
 
     procedures = ("def",)
+    reader = KrlGoal
     passed = (
         said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
     )  # fmt: skip
@@ -101,14 +101,11 @@ class KrlMachine(TaskMachine):
     _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
     _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
 
-    @cached_property
-    def goals(self) -> KrlGoals:
-        """What reads destinations."""
-        return KrlGoals(self.task, frozenset(self.start.aux))
-
     def run(self) -> None:
         """Follow every way from the first routine."""
-        modes = KrlModes(tool=_frame(self.start.tool), base=_frame(self.start.uframe))
+        modes = KrlModes(
+            tool=_frame(self.task.start.tool), base=_frame(self.task.start.uframe)
+        )
         modes = modes.beside(self.task)
         first = self.task.files[0]
         here = self.begin(frozenset([START]), modes)
@@ -291,7 +288,7 @@ class KrlMachine(TaskMachine):
 
     def _is_overruled(self, name: str) -> bool:
         """Return True if the cell says what a routine of a package does."""
-        return self.start.assume_motion or name in self.start.routines
+        return self.task.start.assume_motion or name in self.task.start.routines
 
     def after_functions(
         self, at: At, one: ir.SourceStatement, here: Arrived
@@ -547,9 +544,9 @@ def _is_modal(name: str) -> bool:
     return own or (name.startswith("$") and name not in HALTING | HARMLESS)
 
 
-def _frame(record: tuple[float, ...] | None) -> KrlFrame:
+def _frame(record: tuple[float, ...] | None) -> TaskFrame:
     """Take a frame over from the cell."""
-    return KrlFrame(() if record is None else cell_pose(record))
+    return TaskFrame(() if record is None else cell_pose(record))
 
 
 def _halt(here: Arrived, halted: bool | None) -> Arrived:

@@ -11,7 +11,7 @@ from typing import Any
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
-from postproc.language.analysis.modal_state import ModalState
+from postproc.language.analysis.conditions import ModalState, TaskFrame
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord
 from postproc.language.krl import symbols
@@ -20,7 +20,6 @@ from postproc.language.krl.frames import (
     NUMBERS,
     ZERO,
     FrameReader,
-    KrlFrame,
     no_frame,
     set_component,
 )
@@ -67,8 +66,8 @@ class KrlModes(ModalState):
     """
 
     collected = ("declared", "active", "blocked")
-    tool: KrlFrame
-    base: KrlFrame
+    tool: TaskFrame
+    base: TaskFrame
     interpolation: str = "#base"
     speed: float = UNKNOWN
     share: float = UNKNOWN
@@ -179,36 +178,9 @@ _PARTS: Mapping[str, Mapping[str, str]] = {
     "$vel": {"cp": "speed"}, "$apo": {"cdis": "distance", "cptp": "overlap"},
 }  # fmt: skip
 """Variables that are set to numbers: components, and the modes that they are."""
-# System variables that change nothing of where targets are and from which side they are
-# reached; those in the first list do not stop what is planned ahead either.
-PLANNED = frozenset(
-    """
-    $vel $vel_axis $vel_extax $acc $acc_axis $acc_extax $jerk $apo $ori_type $circ_type
-    $circ_mode $ipo_mode $tool $base $load $advance $bwdstart $gear_jerk $act_tool
-    $act_base $act_tool_c $act_base_c $collmon_tol_pro $act_ex_ax $h_pos $ov_pro
-    $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
-    $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
-    $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
-    $deactivate_abs_accur $suppress_abs_accur $out_c
-    """.split()
-)
-_SETTING = frozenset(
-    """
-    $load $ipo_mode $ori_type $circ_mode $tech $tech_c $load_a1 $load_a2 $load_a3 $world
-    $nullframe
-    """.split()
-)  # of those that are planned, what targets are left for where its value is not known
+PLANNED, _SETTING = said.NAMES["planned"], said.NAMES["setting"]
 HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
-HARMLESS = frozenset(
-    """
-    $timer $timer_stop $timer_flag $flag $cycflag $loop_msg $loop_cont $msg_t $data_ok
-    $err $stopmess $mode_op $pro_state $pro_mode $pro_ip $pal_mode $notaus $user_saf
-    $alarm_stop $interpreter $date $rob_timer $techpar $techval $cmd $home_pos
-    $in_home $axis_home $pos_ret $axis_ret $pos_int $axis_int $pos_for $axis_for
-    $pos_back $axis_back $pos_act_mes $dist_next $motion $tsys $distance $vel_act
-    $torque_axis_act $curr_act $serv_off $move_enable $accu_state $outc
-    """.split()
-)
+HARMLESS = said.NAMES["harmless"]
 
 
 SUBMIT = "a submit program may set {} at any time"
@@ -318,7 +290,7 @@ class ModeReader:
         which = one.target.name[1:]
         if one.target.steps:
             new = self._component(getattr(modes, which), one.target.steps, one.value)
-            if isinstance(new, KrlFrame):
+            if isinstance(new, TaskFrame):
                 return modes.with_(**{which: new})
             why = f"a component of {one.target.name.upper()} is set by the program"
             return modes.with_(**{which: no_frame(why)})
@@ -344,13 +316,13 @@ class ModeReader:
             value = self._entry_value(modes, one)
         elif table != "load_data":
             value = self._component(modes.store.get(key), parts, one.value)
-        if isinstance(value, KrlFrame) and table in self.task.taught:
+        if isinstance(value, TaskFrame) and table in self.task.start.taught:
             value = replace(value, taught=True)
         return modes.hold(key, value)
 
     def _component(
         self, held: object, parts: Sequence[str | ir.ElementStep], value: ir.Operand
-    ) -> KrlFrame | KnownRecord | None:
+    ) -> TaskFrame | KnownRecord | None:
         """Set a component of a frame, None where what it then is is not known."""
         if len(parts) != 1 or not isinstance(parts[0], str):
             return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,13 +13,14 @@ import numpy as np
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import AssignedPoint, Points, Scope
-from postproc.language.analysis.found_visits import FoundGoal, FoundVisit, not_reached
+from postproc.language.analysis.assigned_points import NO_POINTS, AssignedPoint, Scope
+from postproc.language.analysis.conditions import TaskFrame
+from postproc.language.analysis.found_goals import FoundGoal, hold_numbers, not_reached
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl import syntax as said
-from postproc.language.krl.frames import FrameReader, KrlFrame, no_frame, six_numbers
+from postproc.language.krl.frames import FrameReader, no_frame, six_numbers
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -37,6 +38,7 @@ def no_target(text: str) -> Reason:
 HOME = ("xhome", "home", "$h_pos")  # that of the cell, where no file says more
 HOMES = (*HOME, "xhome1", "xhome2", "xhome3", "xhome4", "xhome5", "$axis_home")
 AT_HOME = no_target("it is a home position")
+STAYS = no_target("it stays where it is")
 PRESENT = ("$pos_act", "$axis_act")
 BEFORE = ("$axis_act_meas", "$axis_int", "$pos_int")  # where it was, or nearly is
 SPLINE = Reason(
@@ -74,7 +76,7 @@ ANGLE = Reason(
 
 
 @dataclass
-class KrlVisit(FoundVisit):
+class KrlVisit(goals.FoundVisit):
     """One arrival, as it is found.
 
     Attributes:
@@ -98,73 +100,33 @@ class KrlVisit(FoundVisit):
         return any(word.startswith("c_") for word in self.move.words)
 
 
-@dataclass(frozen=True)
-class KrlGoals:
-    """Reads the destinations of moves.
+def _reach(goal: FoundGoal, by_joints: bool, alone: bool) -> FoundGoal:
+    """Return where a move to a point leads, as far as that is followed.
 
-    Attributes:
-        task: The files of the job.
-        aux: External axes that the cell declares.
+    Missing numbers are those of axes, or of X, Y, Z on a line: of A, B, C the others
+    cannot be told by where the arm is, and a joint move needs S and T.
+
+    Args:
+        goal: The point.
+        by_joints: The move is a PTP.
+        alone: It stands in no spline block, and is no arc.
     """
-
-    task: symbols.KrlTask
-    aux: Collection[int] = ()
-
-    def visits(
-        self, move: said.KrlMove, here: Scope, modes: object, points: Points
-    ) -> Iterator[KrlVisit]:
-        """Read the visits of a move: the point of an arc, and its end."""
-        motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
-        block, given = self.block(here), dict[str, Any]()
-        in_joints = False
-        if block is not None:
-            move, given = self._in_block(move, here, block)
-            begin = self.task.files[here.file].text.statement(block.start)
-            in_joints = (
-                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
-            )
-        if kind not in _POINTS[block is not None, in_joints]:
-            goal = not_reached(self._reader(move, here).goal(move.to), SPLINE)
-            yield KrlVisit(here, motion, False, goal, modes, **given, move=move)
-            return
-        there = replace(here, points=points) if points.routines else here
-        reader = self._reader(move, there)
-        angle = math.radians(self.task.number(move.angle, here))
-        unknown = move.angle is not None and math.isnan(angle)
-        why = ANGLE if unknown else NO_REASON
-        if move.via is not None:
-            goal = reader.goal(move.via)
-            yield KrlVisit(here, motion, True, goal, modes, why=why, **given, move=move)
-        goal = reader.goal(move.to)
-        if why:
-            goal = not_reached(goal, ANGLE)
-        yield KrlVisit(
-            here, motion, False, goal, modes,
-            why=SPLINE if in_joints else NO_REASON,
-            arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
-        )  # fmt: skip
-
-    def _reader(self, move: said.KrlMove, here: Scope) -> KrlGoal:
-        within = self.block(here) is not None
-        return KrlGoal(self.task, here, move, within, self.aux)
-
-    def block(self, here: Scope) -> range | None:
-        """Return the rows of the spline block that a move stands in."""
-        blocks = self.task.files[here.file].splines
-        at = bisect_right(blocks, here.row, key=lambda rows: rows.start) - 1
-        return blocks[at] if at >= 0 and here.row in blocks[at] else None
-
-    def _in_block(
-        self, move: said.KrlMove, here: Scope, rows: range
-    ) -> tuple[said.KrlMove, dict[str, Any]]:
-        """Blend the last move of a block as its end says; say what visits share."""
-        file = self.task.files[here.file]
-        inner = here.row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
-        end = file.text.statement(rows.stop)
-        if isinstance(end, said.SplineBlock) and not inner:
-            move = replace(move, words=(*move.words, *end.words))
-        shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
-        return move, shared
+    why, target = NO_REASON, goal.target
+    in_axes = target == Meaning.HOME and not math.isnan(goal.values[0])
+    in_axes |= target in (Meaning.JOINTS, Meaning.PARTIAL_JOINTS)
+    if in_axes and not by_joints:
+        why = NOT_BY_JOINTS
+    elif target in (Meaning.PARTIAL_JOINTS, Meaning.PARTIAL_POSE):
+        why = NO_REASON if alone and in_axes == by_joints else PARTIAL
+    elif target == Meaning.POSE and by_joints:
+        why = NO_STATUS if pose_encoding.NOT_WRITTEN in goal.values[6:] else why
+        why = why or (ODD_STATUS if goal.why == ODD_STATUS else NO_REASON)
+    if not why:
+        return goal
+    if goal.slots[0] >= 0 or goal.point < 0:
+        return FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=why)
+    pins = goal.pins or f"{goal.name} is shifted without S and T"
+    return hold_numbers(goal, goal.name, why, pins)
 
 
 def motion_of(word: str) -> Motion:
@@ -195,35 +157,88 @@ def own_numbers(move: said.KrlMove) -> list[int] | None:
 
 @dataclass(frozen=True)
 class KrlGoal(goals.GoalReader):
-    """Reads the ends of one move.
-
-    Attributes:
-        move: The move.
-        in_block: It stands in a spline block.
-        axes: External axes that the cell declares.
-    """
+    """Reads where moves lead."""
 
     task: symbols.KrlTask
-    move: said.KrlMove
-    in_block: bool
-    axes: Collection[int] = ()
     dialect = pose_encoding.KRL_DIALECT
     brackets = "[]"
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
+    outlives = "stands in a data list: it outlives the run"
+
+    # Moves.
+
+    def visits(self, one: said.KrlMove, scope: Scope, modes: Any) -> Iterator[KrlVisit]:
+        """Read the visits of a move, see `GoalReader.visits`."""
+        motion, kind = motion_of(one.word), one.word.removesuffix("_rel")
+        block, given = self._block, dict[str, Any]()
+        in_joints = False
+        if block is not None:
+            one, given = self._in_block(one, block)
+            begin = self.task.files[scope.file].text.statement(block.start)
+            in_joints = (
+                isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
+            )
+        if kind not in _POINTS[block is not None, in_joints]:
+            goal = not_reached(self.at(scope)._read_end(one, one.to), SPLINE)
+            yield KrlVisit(scope, motion, False, goal, modes, **given, move=one)
+            return
+        angle = math.radians(self.task.number(one.angle, scope))
+        unknown = one.angle is not None and math.isnan(angle)
+        why = ANGLE if unknown else NO_REASON
+        if one.via is not None:
+            goal = self._read_end(one, one.via)
+            yield KrlVisit(scope, motion, True, goal, modes, why=why, **given, move=one)
+        goal = self._read_end(one, one.to)
+        if why:
+            goal = not_reached(goal, ANGLE)
+        yield KrlVisit(
+            scope, motion, False, goal, modes,
+            why=SPLINE if in_joints else NO_REASON,
+            arc_angle=angle, curved=in_joints or kind == "spl", **given, move=one,
+        )  # fmt: skip
+
+    def _read_end(self, move: said.KrlMove, operand: ir.Operand | None) -> FoundGoal:
+        """Read where a move goes: on from where the arm is, or to a point.
+
+        On an arc or in a spline block the arm is where the arc or the block begins.
+        """
+        by_joints = motion_of(move.word) == Motion.JOINT
+        if move.word.endswith("_rel"):
+            return self._read_step(operand, move)
+        alone = move.via is None and self._block is None
+        if alone and isinstance(operand, ir.DataObject) and operand.name in PRESENT:
+            step = Meaning.BY if by_joints else Meaning.RELATIVE_UFRAME
+            nowhere = (0.0,) * pose_encoding.WIDTH
+            return FoundGoal(step, nowhere, name=operand.name, why=STAYS)
+        return _reach(self.goal(operand), by_joints, alone)
 
     @property
-    def _by_joints(self) -> bool:
-        return motion_of(self.move.word) == Motion.JOINT
+    def _block(self) -> range | None:
+        """The rows of the spline block that the move stands in."""
+        blocks, row = self.task.files[self.here.file].splines, self.here.row
+        at = bisect_right(blocks, row, key=lambda rows: rows.start) - 1
+        return blocks[at] if at >= 0 and row in blocks[at] else None
+
+    def _in_block(
+        self, move: said.KrlMove, rows: range
+    ) -> tuple[said.KrlMove, dict[str, Any]]:
+        """Blend the last move of a block as its end says; say what visits share."""
+        here = replace(self.here, points=NO_POINTS)
+        file = self.task.files[here.file]
+        inner = here.row != file.moves[np.searchsorted(file.moves, rows.stop) - 1]
+        end = file.text.statement(rows.stop)
+        if isinstance(end, said.SplineBlock) and not inner:
+            move = replace(move, words=(*move.words, *end.words))
+        shared = {"block": here.at(rows.start), "begin": rows.start, "inner": inner}
+        return move, shared
+
+    # Points.
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
-        """Read steps, home positions, where the arm is, and products of frames."""
-        if self.move.word.endswith("_rel"):
-            return self._step(operand)
+        """Read home positions, where the arm is, and products of frames."""
         match operand:
-            case ir.DataObject(name=name) if name in PRESENT:
-                return self._stay(operand)
-            case ir.DataObject(name=name) if name in BEFORE:
+            case ir.DataObject(name=name) if name in (*PRESENT, *BEFORE):
                 return self.unknown(no_target(goals.RUN_TIME), name)
             case ir.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
@@ -231,22 +246,12 @@ class KrlGoal(goals.GoalReader):
                 return self._product(first, second)
         return None
 
-    # Points.
-
-    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
+    def read_value(self, value: Value | None) -> FoundGoal | None:
         """Read joint angles or a position."""
         if not isinstance(value, KnownRecord) or not value.whole:
             return None
         by_axes = not value.by_name.keys().isdisjoint(symbols.AXES)
-        goal = self._axes(value) if by_axes else self._pose(value)
-        if name and goal.why.code is Code.PARTIAL_TARGET:
-            return self.unknown(PARTIAL)  # what it lacks may be told elsewhere
-        return goal
-
-    def is_shared(self, name: str) -> bool:
-        """Return True for GLOBAL data."""
-        declared = self.task.datum(name, self.here)
-        return declared is not None and declared[1].scope == "global"
+        return self._axes(value) if by_axes else self._pose(value)
 
     def explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
@@ -256,29 +261,22 @@ class KrlGoal(goals.GoalReader):
     def explain_pinned(self, name: str, slot: int) -> str:
         """Say why a point must keep its numbers."""
         if self.is_of_system(slot):
-            place = self.task.files[self.task.file_of(slot)].text.source.name
+            numbering = self.task.numbering
+            place = numbering.names[numbering.file_of(slot)]
             return f"{name} stands in {place}, which all programs share"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""
 
-    def explain_kept(self, held: AssignedPoint) -> Iterator[str]:
-        """Say that points of lists keep what they are given."""
-        for place in held.chain:
-            if not place[2]:
-                yield f"{place[-1]} stands in a data list: it outlives the run"
-
     def is_followed_whole(self, held: AssignedPoint, value: Value | None) -> bool:
         """Return True unless an external axis that the cell declares is missing."""
         fields = dict(value.fields) if isinstance(value, KnownRecord) else {}
-        lacks_axis = any(symbols.OUTSIDE[axis - 1] not in fields for axis in self.axes)
-        return held.operand is not None or not lacks_axis
+        needed = {symbols.OUTSIDE[axis - 1] for axis in self.task.start.aux}
+        return held.goal is not None or needed <= fields.keys()
 
     def _axes(self, found: KnownRecord) -> FoundGoal:
-        """Read six joint angles; only PTP goes to them."""
+        """Read six joint angles."""
         numbers = _numbers(found, symbols.AXES)
-        if not self._by_joints:
-            return self.unknown(NOT_BY_JOINTS)
         if numbers is None:
             return self._partial(found, symbols.AXES, Meaning.PARTIAL_JOINTS)
         slots = goals.list_slots(numbers, pose_encoding.WIDTH)
@@ -300,14 +298,10 @@ class KrlGoal(goals.GoalReader):
         ]
         values = [one.value for one in (*numbers, *written)]
         slots = goals.list_slots(numbers, pose_encoding.WIDTH)
-        file_of = self.task.file_of
+        file_of = self.task.numbering.file_of
         file = file_of(slots[0])
         own = tuple(one.slot if file_of(one.slot) == file else -1 for one in written)
         aux, why = self._outside(found), self._status(values[6], values[7])
-        if self._by_joints and pose_encoding.NOT_WRITTEN in values[6:]:
-            return self.unknown(NO_STATUS)
-        if self._by_joints and why.code is Code.CONFIGURATION_UNKNOWN:
-            return self.unknown(why)
         why = why or (NO_REASON if file >= 0 else goals.COMPUTED)
         return FoundGoal(
             Meaning.POSE, tuple(values), (*slots[:6], *own), NO_SLOTS, aux=aux, why=why
@@ -316,15 +310,9 @@ class KrlGoal(goals.GoalReader):
     def _partial(
         self, found: KnownRecord, names: Sequence[str], meaning: Meaning
     ) -> FoundGoal:
-        """Read numbers of which some are missing: they stay what they were before.
-
-        It is followed by axes, or by X, Y, Z on a line. Of A, B, C the others cannot be
-        told by where the arm is, and a joint move needs S and T.
-        """
+        """Read numbers of which some are missing: they stay what they were before."""
         given = {key for key, _ in found.fields}
-        moves_so = (meaning == Meaning.PARTIAL_JOINTS) == self._by_joints
-        alone = not self.in_block and self.move.via is None and bool(given & {*names})
-        if not (moves_so and alone and given <= {*names, *symbols.OUTSIDE}):
+        if not (given & {*names} and given <= {*names, *symbols.OUTSIDE}):
             return self.unknown(PARTIAL)
         values = [found.number(name) for name in names]
         values += [math.nan] * (pose_encoding.WIDTH - len(values))
@@ -345,22 +333,9 @@ class KrlGoal(goals.GoalReader):
         """Return the external axes that count: declared by the cell, or not 0."""
         values = [found.number(name) for name in symbols.OUTSIDE]
         return tuple(
-            value if value != 0.0 or axis in self.axes else math.nan
+            value if value != 0.0 or axis in self.task.start.aux else math.nan
             for axis, value in enumerate(values, start=1)
         )
-
-    def _stay(self, operand: ir.DataObject) -> FoundGoal:
-        """Read a move to where the arm is: a step of nothing.
-
-        On an arc or in a spline block that is where the arc or the block begins. What
-        data were given is where the arm was then.
-        """
-        name, given = operand.name, operand is not self.move.to
-        if given or self.in_block or self.move.via is not None:
-            return self.unknown(no_target(goals.RUN_TIME), name)
-        meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
-        why = no_target("it stays where it is")
-        return FoundGoal(meaning, (0.0,) * pose_encoding.WIDTH, name=name, why=why)
 
     def _home(self, operand: ir.DataObject) -> FoundGoal:
         """Read a home position: it holds no target of a process."""
@@ -392,13 +367,6 @@ class KrlGoal(goals.GoalReader):
         shift = FrameReader(self.task, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not shift.pose:
             return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
-        if behind and self._by_joints:
-            return replace(
-                base, target=Meaning.UNKNOWN, values=self.nothing, why=NO_STATUS,
-                slots=(-1,) * pose_encoding.WIDTH, follows=base.origin,
-                pins=base.pins or f"{base.name} is shifted without S and T",
-                holds=base.holds | own,
-            )  # fmt: skip
         by, slots = self._shift(base, other, shift, behind)
         base = replace(base, stays=base.stays or base.slots[0] < 0)
         aux = self._outside_of(base, other) if behind else base.aux
@@ -412,7 +380,8 @@ class KrlGoal(goals.GoalReader):
         value = self.task.value(other, self.here)
         numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
         first = goals.list_slots(numbers or (), pose_encoding.WIDTH)[0]
-        return frozenset([first] if self.task.file_of(first) == self.here.file else [])
+        own = self.task.numbering.file_of(first) == self.here.file
+        return frozenset([first] if own else [])
 
     def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
@@ -428,7 +397,7 @@ class KrlGoal(goals.GoalReader):
         return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
 
     def _shift(
-        self, base: FoundGoal, other: ir.Operand, frame: KrlFrame, behind: bool
+        self, base: FoundGoal, other: ir.Operand, frame: TaskFrame, behind: bool
     ) -> tuple[Shift, tuple[int, ...]]:
         """Say how a point is shifted, and where the numbers of that stand.
 
@@ -442,13 +411,14 @@ class KrlGoal(goals.GoalReader):
         shift = Shift(kind, tuple(told), base.values, flagged=not behind)
         written = numbers if isinstance(other, said.KrlAggregate) else None
         slots = goals.list_slots(written or (), pose_encoding.WIDTH)
-        files = {self.task.file_of(one.slot) for one in written or ()}
+        files = {self.task.numbering.file_of(one.slot) for one in written or ()}
         return shift, slots if files == {self.here.file} else NO_SLOTS
 
     # Steps.
 
-    def _step(self, operand: ir.Operand | None) -> FoundGoal:
+    def _read_step(self, operand: ir.Operand | None, move: said.KrlMove) -> FoundGoal:
         """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
+        by_joints = motion_of(move.word) == Motion.JOINT
         found = self.task.value(operand, self.here)
         if not isinstance(operand, said.KrlAggregate) or not isinstance(
             found, KnownRecord
@@ -458,14 +428,14 @@ class KrlGoal(goals.GoalReader):
             return self.unknown(goals.AT_RUN_TIME)
         names = {key for key, _ in found.fields}
         values = {name: found.number(name) for name in names - {"s", "t"}}
-        if self._by_joints and names <= {*symbols.AXES, *symbols.OUTSIDE}:
+        if by_joints and names <= {*symbols.AXES, *symbols.OUTSIDE}:
             steps = tuple(values.get(name, 0.0) for name in symbols.AXES)
             return self._step_goal(Meaning.BY, (*steps, 0.0, 0.0), values)
         place = tuple(values.get(name, 0.0) for name in PLACE[:3])
         turned = any(values.get(name, 0.0) for name in PLACE[3:])
-        if self._by_joints or turned or self.move.via is not None:
+        if by_joints or turned or move.via is not None:
             return self.unknown(no_target("a step that is not followed"))
-        tool = "#tool" in self.move.words
+        tool = "#tool" in move.words
         meaning = Meaning.RELATIVE_TOOL if tool else Meaning.RELATIVE_UFRAME
         return self._step_goal(meaning, (*place, *(0.0,) * 5), values)
 

@@ -29,15 +29,6 @@ def _routine(kind: str) -> Callable[[Children], ir.RoutineHead]:
     return build
 
 
-# Without DECL only these begin a declaration: other pairs of names may be commands.
-_BUILT_IN = frozenset(
-    """
-    int real bool char frame pos e6pos axis e6axis fdat pdat ldat gdat odat ctrl_in
-    load jerk_struc signal date
-    """.split()
-)
-
-
 def _build_declaration(c: Children) -> ir.Declaration:
     flags, ((type_,),) = _words(c, "flag"), parts(c, "type")
     items = tuple(x for x in c if isinstance(x, ir.DeclaredItem))
@@ -48,7 +39,7 @@ def _build_declaration(c: Children) -> ir.Declaration:
 
 def _build_builtin(c: Children) -> ir.SourceStatement:
     found = _build_declaration(c)
-    return found if found.type in _BUILT_IN else ir.NotUnderstood()
+    return found if found.type in said.NAMES["type"] else ir.NotUnderstood()
 
 
 def _move(c: Children) -> said.KrlMove:
@@ -107,7 +98,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "header": lambda c: said.AccessHeader(),
     "procedure": _routine("def"),
     "function": _routine("deffct"),
-    "data_list": lambda c: said.DataList(low(c[0]), bool(_tokens(c, "PUBLIC"))),
+    "data_list": lambda c: said.DataList(low(c[0])),
     "type": part("type"),
     "parameter": lambda c: _parameter(*_tokens(c, "NAME")),
     "empty_dimensions": lambda c: None,
@@ -142,25 +133,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
 
 LONGEST = 1 << 14  # characters of a form; a line has some hundred
 DEEPEST = 100  # operators or brackets within each other; followed by recursion
-RESERVED = frozenset(
-    """
-    and b_and b_exor b_not b_or brake case const continue decl def default defdat deffct
-    do else end enddat endfct endfor endif endloop endspline endswitch endwhile enum
-    exit exor ext extfct for global goto halt if import interrupt loop not or ptp lin
-    circ sptp slin scirc spl spline ptp_spline ptp_rel lin_rel circ_rel sptp_rel
-    slin_rel scirc_rel spl_rel repeat resume return signal struc switch then time_block
-    to trigger until const_vel wait when while with c_ptp c_dis c_ori c_vel c_spl
-    """.split()
-)
-"""Words that name nothing."""
-_NAMES_ONLY = frozenset(
-    """
-    ext extp extfct extfctp signal enum struc import channel confirm anin anout digin
-    """.split()
-)
-"""Words of statements that name something, or read and write in the background."""
-
-_PARSER = FormParser("krl", RULES, RESERVED, LONGEST, DEEPEST)
+_PARSER = FormParser("krl", RULES, said.NAMES["reserved"], LONGEST, DEEPEST)
 
 
 @lru_cache(maxsize=8192)
@@ -169,6 +142,6 @@ def parse_statement(form: str) -> ir.SourceStatement:
     words = form.lower().split(" ", 2)
     if words[0] == "global" and len(words) > 1:
         words = words[1:]
-    if words[0] in _NAMES_ONLY and len(words) > 1:
+    if words[0] in said.NAMES["outside"] and len(words) > 1:
         return said.OutsideName()
     return _PARSER.parse_statement(form)

@@ -17,18 +17,16 @@ from postproc.language.analysis.symbols import whole
 from postproc.language.krl import syntax as said
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.parser import parse_statement
-from postproc.language.text.blocks import BlockWords, Outline
+from postproc.language.text.blocks import INNER, BlockWords, Outline
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
 
 _ROUTINES = ("def", "deffct")
 _WORDS = BlockWords(
     ends={
-        "end": "def", "endfct": "deffct", "enddat": "defdat", "endif": "if",
-        "endfor": "for", "endwhile": "while", "endtest": "test", "endloop": "loop",
-        "until": "repeat", "endspline": "spline",
+        **INNER, "end": "def", "endfct": "deffct", "enddat": "defdat",
+        "endspline": "spline",
     },
-    within={"else": "if", "case": "test", "default": "test"},
     scopes=(*_ROUTINES, "defdat"),
     outer=(),
     routines=_ROUTINES,

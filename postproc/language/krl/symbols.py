@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 
@@ -28,13 +27,6 @@ from postproc.language.text.symbol_column import read_names
 CONFIG = "$config"
 ANY = -1  # an entry of a table whose number is not known
 POSITIONS = ("pos", "e6pos")  # types
-MOVE_WORDS = frozenset(
-    """
-    ptp lin circ sptp slin scirc spl ptp_rel lin_rel circ_rel sptp_rel slin_rel
-    scirc_rel spl_rel
-    """.split()
-)
-"""Words that a move begins with."""
 AXES = tuple(f"a{k}" for k in range(1, 7))
 OUTSIDE = tuple(f"e{k}" for k in range(1, 7))
 FIELDS: Mapping[str, Layout] = {
@@ -71,38 +63,8 @@ PERHAPS = "perhaps"
 HELD = frozenset(TABLES) | CORRECTION_FRAMES | SWITCHES
 """Names of data that hold until the program sets them again."""
 
-# Routines and functions that do not move; of these, those that change what they get.
-STILL = frozenset(
-    """
-    ir_stopm pulse clear_pulse cread cwrite sread swrite copen cclose cioctl cast_to
-    cast_from varstate strlen strdeclen strclear stradd strcomp strcopy strfind
-    msgnotify msgquit msgstate msgdialog msgloop set_kuka_msg clear_kuka_msg
-    exists_kuka_msg set_krlmsg clear_krlmsg exists_krlmsg set_krldlg exists_krldlg
-    mbx_rec on_error_proceed err_clear err_raise timer_limit delete_backward_buffer
-    rob_timer get_decl_place m_comment setinfo lock unlock
-    eki_init eki_open eki_close eki_clear eki_clearbuffer eki_checkbuffer eki_send
-    eki_lock eki_unlock eki_setint eki_setreal eki_setbool eki_setstring eki_setframe
-    eki_getint eki_getreal eki_getbool eki_getstring eki_getframe eki_getintarray
-    eki_getrealarray eki_getboolarray eki_getframearray
-    """.split()
-)
-WRITING = frozenset(
-    """
-    cread sread cast_from mbx_rec strcopy strclear stradd eki_getint eki_getreal
-    eki_getbool eki_getstring eki_getframe eki_getintarray eki_getrealarray
-    eki_getboolarray eki_getframearray exists_krldlg
-    """.split()
-)
-FUNCTIONS = frozenset(
-    """
-    abs sqrt sin cos tan acos atan2 frand round trunc b_not inverse forward inv_pos
-    strlen strdeclen strcomp strfind varstate cast_from_bits get_system_data
-    stool stool2 sbase sipo_mode sload svel_cp svel_joint sacc_cp sacc_joint sapo
-    sapo_ptp sori_typ scirc_typ sjerk sgear_jerk use_cm_pro_values exists_kuka_msg
-    ek lk ey eb eb_abs euler mat_to_rpy rpy_to_mat scirc_m s_exax_ign s_exax_ign2
-    k_root k_type k_offs lk_offs k_addr k_name k_shift sync arcgetdelay arcgetpath
-    """.split()
-)
+STILL, WRITING = said.NAMES["still"], said.NAMES["writing"]
+FUNCTIONS = said.NAMES["function"]
 # Routines of packages that are known neither to move the arm nor to set frames.
 
 AHEAD = "ahead"
@@ -144,7 +106,6 @@ class KrlTask(TaskSymbols[KrlFile]):
     layouts = FIELDS
     followed = (*FIELDS, "int", "real", "bool")
     targets = (*FIELDS,)
-    constants: ClassVar = {"true": 1.0, "false": 0.0}
     functions = "deffct"
     by_name = True
     uncertain = ("/",)  # whole numbers divide otherwise than others
@@ -231,7 +192,7 @@ class KrlTask(TaskSymbols[KrlFile]):
         """
         found = set[str]()
         for file in (f for f in self.files if not f.is_submit):
-            words = file.text.words(file.text.of_kind(holds_odd), MOVE_WORDS)
+            words = file.text.words(file.text.of_kind(holds_odd), said.NAMES["move"])
             found |= words if file.routines else words.difference(TABLES)
         return frozenset(found)
 
@@ -385,7 +346,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     def is_taught(self, name: str, file: int, row: int) -> bool:
         """Return True if data of a statement were taught, by the cell or a comment."""
         line = self.files[file].text.line(row)
-        return name in self.taught or line in self.taught_lines[file]
+        return name in self.start.taught or line in self.taught_lines[file]
 
     # Values.
 

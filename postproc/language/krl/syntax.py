@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from postproc.language.ir import Assignment, Node, Operand, SourceStatement
+from postproc.language.text.symbol_column import read_kinds
+
+NAMES = read_kinds(Path(__file__).with_name("names.txt"))
+"""Words, and names of routines, functions and system variables, by what they do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,6 @@ class DataList(SourceStatement):
     """``DEFDAT name PUBLIC``."""
 
     name: str
-    public: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from collections.abc import Container, Mapping, Sequence
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
-from postproc.language.analysis.found_visits import FoundGoal, not_reached
+from postproc.language.analysis.found_goals import FoundGoal, not_reached
 from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.krl import modal_state
 from postproc.language.krl.interpreter import KrlMachine
@@ -60,7 +60,7 @@ class KrlCollector(to_visits.TaskCollector):
         _keep_orientation(machine, found)
         _follow_partial(machine, found)
         super().__init__(machine)
-        self.krl, self.base = machine, cell_pose(machine.start.base)
+        self.krl, self.base = machine, cell_pose(machine.task.start.base)
         self.ends, self.odd = _ends(found, machine.lost), _odd_status(found)
         self.number = {id(v): k for k, v in enumerate(found)}
 
@@ -72,7 +72,7 @@ class KrlCollector(to_visits.TaskCollector):
         active = {why for _, why in modes.active}
         early = machine.early.get(at, frozenset())
         blocked = modes.blocked | active | machine.everywhere | early
-        if "track" not in machine.start.aux.values():
+        if "track" not in machine.task.start.aux.values():
             blocked -= modal_state.OF_TRACK
         given = (*sorted(blocked), v.why, v.goal.why, unset, modes.tool.why)
         if v.goal.target != Meaning.JOINTS:

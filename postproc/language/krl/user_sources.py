@@ -12,7 +12,6 @@ from postproc.language.krl.files import ARCHIVE_DEPTH, KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import KrlTask
-from postproc.language.language import Start
 from postproc.language.text.source import source_from_bytes
 
 USER_SOURCES = ("user_grp.src", "userspot.src")
@@ -65,5 +64,5 @@ def _acts_by_text(name: str, text: bytes) -> bool:
     if not KrlFileName(name).is_system_source(text):
         return False
     file = read_krl(source_from_bytes(name, text))
-    machine = KrlMachine(task=KrlTask([file]), start=Start())
+    machine = KrlMachine(task=KrlTask([file]))
     return any(map(machine.routine_effects, machine.task.routines_by_file[0]))

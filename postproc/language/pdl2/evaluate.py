@@ -9,6 +9,7 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import Context
 from postproc.language.analysis.values import WrittenNumber
+from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.values import (
@@ -32,11 +33,6 @@ from postproc.language.pdl2.values import (
 
 _DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
-_WORDS = frozenset(
-    "joint linear circular seg_via fly_norm fly_cart fly_auto fly_pass fly_tol "
-    "fly_from nosettle coarse fine jnt_coarse jnt_fine rs_world rs_traj eul_world "
-    "rpy_world wrist_jnt".split()
-)
 _POSITION_TYPES = frozenset({"position", "xtndpos", "jointpos", "vector"})
 _FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
 
@@ -188,7 +184,7 @@ class Execution:
         if not reference.steps and self.world.type_of(self.place, name) is None:
             if name in _TRUTH:
                 return _TRUTH[name]
-            if name in _WORDS:
+            if name in ast.NAMES["word"]:
                 return name
         if self.world.is_function(self.place, name):
             return self.value(ir.FunctionCall(name, ()))
@@ -264,8 +260,7 @@ class Execution:
         match expression:
             case ir.Num(slot):
                 lines = self.place.program.lines
-                base = self.world.slot_base[lines.source.name]
-                at = int(base + lines.first[self.row] + slot)
+                at = int(self.place.first + lines.first[self.row] + slot)
                 return self._with_slot(expression, at)
             case ir.Operation("()", (operand,)):
                 return self.read_number(operand)

@@ -8,23 +8,10 @@ from pathlib import Path
 
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.program import Program
 from postproc.language.text.symbol_column import read_names
-
-_BUILT_IN = frozenset(
-    "act_post array_dim1 array_dim2 bit_flip cond_disable cond_dsbl_all cond_enable "
-    "cond_enbl_all dir_get dir_set dv_state eof err_post err_str err_str_prog err_trap "
-    "fl_bytes_left fl_get_pos fl_set_pos fl_state ip_to_str key_lock "
-    "mem_space node_get_name node_set_name pos_in_range prog_state random "
-    "sensor_get_data sensor_get_ofst str_get_int str_get_real str_num str_strip "
-    "str_to_ip str_token table_add table_del var_info "
-    "win_attr win_clear win_color win_create win_del win_display win_get_crsr "
-    "win_line win_load win_popup win_remove win_save win_sel win_set_crsr win_size "
-    "win_state scrn_add scrn_clear scrn_create scrn_del scrn_get scrn_remove "
-    "scrn_set".split()
-)
-"""Built-in routines that no cell needs to speak of: they change their arguments."""
 
 TRACKING = "sensor_trk"
 """Built-in routine that lets a sensor lead the arm, or ends that."""
@@ -73,7 +60,7 @@ def effect_of(world: World, program: Program, name: str) -> RoutineEffect:
         return RoutineEffect(said)
     if name == TRACKING:
         return RoutineEffect.TRACKS
-    if name in _BUILT_IN:
+    if name in ast.NAMES["built-in"]:
         return RoutineEffect.STILL
     known = not start.assume_motion and name in list_motionless()
     return RoutineEffect.KNOWN if known else RoutineEffect.UNKNOWN

@@ -209,7 +209,7 @@ def _with_value(seen: Variables) -> list[Variable]:
 
 def _enter_all(world: World, place: Place, file: VariableFile) -> None:
     """Enter what a variable file says: points as columns, the rest one by one."""
-    entries, base = file.entries, world.slot_base[file.source.name]
+    entries, base = file.entries, world.numbering.first[-2]
     places = [layout.kind in POSITIONS for layout in entries.layouts]
     known = np.array(places, dtype=bool)[entries.layout]
     known &= np.isfinite(entries.numbers).all(axis=1)

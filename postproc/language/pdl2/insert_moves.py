@@ -28,12 +28,6 @@ _WITH = re.compile(r"\bWITH\b.*", re.I)
 _VIA = re.compile(r"\bVIA\s+(POS\s*\([^()]*\))", re.I)
 _HEAD = re.compile(r"(\s*)MOVE(?:FLY)?\s+(ARM\s*\[\s*\d+\s*\]\s+)?", re.I)
 
-_MOTION = frozenset(
-    "$lin_spd $rot_spd $spd_opt $arm_spd_ovr $prog_spd_ovr $fly_type $fly_per "
-    "$fly_dist $fly_traj $stress_per $term_type $move_type $ornt_type $cnfg_care "
-    "$turn_care $jnt_mturn".split()
-)
-
 
 @dataclass(frozen=True)
 class Pdl2Splitter(Splitter):
@@ -87,7 +81,7 @@ class Pdl2Splitter(Splitter):
 
     def is_setting(self, one: ir.SourceStatement) -> bool:
         """Return True if motion variables are set."""
-        return isinstance(one, ir.Assignment) and one.target.name in _MOTION
+        return isinstance(one, ir.Assignment) and one.target.name in ast.NAMES["motion"]
 
     def layout(self, file: int, line: int) -> Pdl2Layout:
         """Look at a move, see `Splitter.layout`."""

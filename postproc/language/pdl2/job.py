@@ -13,6 +13,7 @@ from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow
+from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import root_of, wholes
@@ -138,12 +139,14 @@ class Place:
 
     Attributes:
         program, body: Its program and its body.
-        offset: Job-wide index of the first row of the program.
+        offset, first: Job-wide index of the first row of the program, and of its first
+            number.
     """
 
     program: Program
     body: Body
     offset: int
+    first: int
 
     @property
     def flow(self) -> ControlFlow:
@@ -163,8 +166,6 @@ class World:
         main: The program that is compensated.
         others: Other programs, by lower-case program and file name.
         start: What the cell says.
-        slot_base: First global number index of each file, by file name.
-        row_base: Likewise of rows.
         initial: What variables hold before the program assigns them, by key.
         changing: Exported variables, by key, that another program may write at any
             time: numbers, texts and switches, no positions.
@@ -182,8 +183,6 @@ class World:
     others: Mapping[str, Program]
     start: Start
     variables: ValueFile | None
-    slot_base: dict[str, int] = field(default_factory=dict)
-    row_base: dict[str, int] = field(default_factory=dict)
     initial: InitialValues = field(default_factory=InitialValues)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     loose: dict[str, str] = field(default_factory=dict)
@@ -199,17 +198,16 @@ class World:
     _later: tuple[int, dict[str, list[str]]] | None = None
 
     def __post_init__(self) -> None:
-        base, row = 0, 0
         for program in self.programs():
-            self.slot_base[program.lines.source.name] = base
-            self.row_base[program.lines.source.name] = row
-            row += len(program.lines) + 1
-            base += len(program.lines.numbers)
             source = program.lines.source
             self.taught_lines[source.name] = COMMENTS.list_taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)
-        if self.variables is not None:
-            self.slot_base[self.variables.source.name] = base
+
+    @cached_property
+    def numbering(self) -> Numbering:
+        """The statements and numbers of all files, the variable file the last."""
+        others = [] if self.variables is None else [self.variables.lines]
+        return Numbering([*(one.lines for one in self.programs()), *others])
 
     @property
     def arm(self) -> int:
@@ -240,7 +238,9 @@ class World:
 
     def place(self, program: Program, body: Body) -> Place:
         """Return where the statements of a body stand."""
-        return Place(program, body, self.row_base[program.lines.source.name])
+        rows, first = self.numbering.rows, self.numbering.first
+        at = self.numbering.names.index(program.lines.source.name)
+        return Place(program, body, rows[at], first[at])
 
     def report(self, program: Program, row: int, code: Code, message: str) -> None:
         """Collect a finding at a logical line."""

@@ -111,20 +111,13 @@ def _destination(c: Children) -> RulePart:
     return RulePart("destination", (c[0].kind, where, None, frame))
 
 
-_CONDITION_WORDS = frozenset(
-    "and at before by condition div error event for in mod not of or percent segment "
-    "signal time to until via when with xor after distance end start".split()
-)
-"""Words of the language that brackets may follow without being called."""
-
-
 def _terms(c: Children) -> tuple[ir.DataObject | ir.FunctionCall, ...]:
     """Return the names in text that is not understood; those with arguments call."""
     found: list[ir.DataObject | ir.FunctionCall] = []
     for one, after in zip_longest(c, c[1:]):
         if isinstance(one, ir.DataObject):
             calls = isinstance(after, RulePart) and after.name == "round_group"
-            calls = calls and one.name not in _CONDITION_WORDS
+            calls = calls and one.name not in ast.NAMES["condition"]
             found.append(ir.FunctionCall(one.name, ()) if calls else one)
         elif isinstance(one, RulePart):
             found += _terms(one.value)

@@ -22,21 +22,7 @@ from postproc.language.pdl2.external_routines import (
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Program
 
-PURE = frozenset(
-    "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
-    "arm_jntp arm_xtnd pos_comp_idl pos_idl_comp abs sqrt sin cos tan asin acos atan2 "
-    "ln exp round trunc ord chr str_len str_loc str_sub str_coding clock date "
-    "var_uninit bit_test array_dim1 array_dim2 path_len sys_call dv_cntrl".split()
-)
-"""Built-in functions: they change no argument and move nothing."""
-
-CHANGING = frozenset(
-    "pos_to_jntp pos_set_loc pos_set_rpy pos_set_norm pos_set_ornt pos_set_appr "
-    "pos_set_cnfg pos_get_loc pos_get_rpy pos_get_norm pos_get_ornt pos_get_appr "
-    "pos_get_cnfg str_cat str_ins str_del str_ovs str_xtrt bit_set bit_clear "
-    "bit_assign node_app node_del node_ins err_trap_on err_trap_off".split()
-)
-"""Built-in routines: they may change their arguments, nothing else."""
+PURE, CHANGING = ast.NAMES["pure"], ast.NAMES["changing"]
 
 NODES = frozenset({"node_app", "node_del", "node_ins"})
 """Those of them that change how many nodes a path has, and no number in them."""
@@ -57,10 +43,6 @@ _MOVING = re.compile(
 )
 _STRING = re.compile(r"'[^']*'")
 _NEXT = re.compile(r";|\b(?:THEN|ELSE|DO|REPEAT)\b|\bCASE\s*\([^)]*\)\s*:", re.I)
-_NO_CALLS = frozenset(
-    "if select case for while until wait write read encode decode open and or not div "
-    "mod then do of to downto step xor condition event".split()
-)
 
 
 def words_in(text: str) -> frozenset[str]:
@@ -87,7 +69,7 @@ def is_harmless(text: str) -> bool:
     if not all(map(_HARMLESS.match, parts)) or _MOVING.search(text):
         return False
     called = {name.lower() for name in _CALL.findall(text)}
-    return called <= PURE | CHANGING | _NO_CALLS
+    return called <= PURE | CHANGING | ast.NAMES["statement"]
 
 
 @dataclass(frozen=True)

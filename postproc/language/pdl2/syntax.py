@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from postproc.language import ir
+from postproc.language.text.symbol_column import read_kinds
+
+NAMES = read_kinds(Path(__file__).with_name("names.txt"))
+"""Words, and names of built-in routines and system variables, by what they do."""
 
 # Statements that declare: programs, routines, variables, types.
 

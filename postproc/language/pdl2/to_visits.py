@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,6 @@ from postproc.language.pdl2.pose_encoding import COMMENTS, PDL2_DIALECT
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.text.comment_directives import MEASURE
-from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import number_in_order
 from postproc.language.visits import Literals, Meaning, Visits, ZoneRule, texts_of
@@ -131,9 +129,7 @@ class Pdl2Collector(Collector):
     def __init__(self, machine: Machine) -> None:
         """Put runs in order, and make room."""
         world = machine.world
-        texts: list[Statements[Any]] = [one.lines for one in world.programs()]
-        texts += [] if world.variables is None else [world.variables.lines]
-        super().__init__(machine, texts)
+        super().__init__(machine, world.numbering)
         width, n = PDL2_DIALECT.width, int(self.counts.sum())
         axes = _most_axes(self.found, world)
         self.columns = VisitColumns(n, width, axes, len(self.numbering))
@@ -149,7 +145,7 @@ class Pdl2Collector(Collector):
         release_memory(len(c))
         literals, literal = find_literals(c, self.numbering)
         literals, follows = self._find_uses(literals, literal)
-        own = self.files, self.graph(), literals, literal, follows
+        own = self.numbering.names, self.graph(), literals, literal, follows
         return to_visits(c, *own, PDL2_DIALECT)
 
     def _find_uses(
@@ -194,7 +190,7 @@ class Pdl2Collector(Collector):
 
     def rows_of(self, run: MoveRun) -> tuple[int, Ints]:
         """Return the file of a run and its rows, see `Collector.rows_of`."""
-        return self.files.index(run.place.program.lines.source.name), run.rows
+        return self.numbering.rows.index(run.place.offset), run.rows
 
     def origins_of(self, run: MoveRun) -> Origins:
         """Return where the arm may come from, in recursion from anywhere."""
@@ -223,7 +219,7 @@ class Pdl2Collector(Collector):
     def _place(self, moves: ProgramMoves) -> None:
         """Enter where moves stand, and what their forms say."""
         c, visit, lines = self.columns, moves.visit, moves.program.lines
-        c.file[visit] = self.files.index(lines.source.name)
+        c.file[visit], _ = self.rows_of(moves.runs[0][1])
         c.line[visit] = lines.begin_line[moves.row]
         c.kind[visit] = moves.of_forms(lambda form: form.motion)
         c.fly[visit] = moves.of_forms(lambda form: form.fly)
@@ -263,7 +259,7 @@ class Pdl2Collector(Collector):
     def _fill_written(self, moves: ProgramMoves) -> None:
         """Fill moves to six numbers that stand in them."""
         c, lines = self.columns, moves.program.lines
-        base = self.machine.world.slot_base[lines.source.name]
+        base = moves.runs[0][1].place.first
         here = moves.point == WRITTEN
         for number, form in enumerate(moves.forms):
             if not form.slots:

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.diagnostics import Code
-from postproc.language.analysis.functions import (
+from postproc.language.analysis.values import (
     COMPARISONS,
+    WrittenNumber,
     apply_function,
     apply_operator,
 )
-from postproc.language.analysis.values import WrittenNumber
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 Numbers = tuple[float | None, ...]

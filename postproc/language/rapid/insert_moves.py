@@ -12,6 +12,7 @@ from postproc.language import ir
 from postproc.language.analysis.insert_moves import TaskSplitter
 from postproc.language.insert_moves import MoveLayout, spell, split_arguments
 from postproc.language.rapid.clones import ends_line
+from postproc.language.rapid.instructions import NAMES
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.text.source import CloneError, Source, Span
 
@@ -22,11 +23,6 @@ _KEPT = frozenset("v wobj tload z inpos".split())  # options whose moves may be 
 _OPTION = re.compile(r"\\\s*(\w+)")
 _IN_ZONE = frozenset("z inpos".split())
 _PLAIN = frozenset("movel movej movec moveabsj".split())
-_MOTION = frozenset(
-    """
-    accset velset worldacclim pathacclim pathresol confj confl singarea cirpathmode
-    """.split()
-)
 _READS = re.compile(rb"\b(?:CRobT|CJointT|CPos|PathRecStart)\b", re.I)
 _UNUSED = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
@@ -69,7 +65,7 @@ class RapidSplitter(TaskSplitter):
 
     def is_setting(self, one: ir.SourceStatement) -> bool:
         """Return True for instructions that set modes."""
-        return isinstance(one, ir.Instruction) and one.name in _MOTION
+        return isinstance(one, ir.Instruction) and one.name in NAMES["motion"]
 
     def is_plain_move(self, one: ir.SourceStatement) -> bool:
         """Return True for moves without a process."""

@@ -1,15 +1,21 @@
-"""Instructions of RAPID by name: which move, and what their arguments are."""
+"""Instructions of RAPID by name, which move, and data that have a name at first."""
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.ir import Argument, Operand
+from postproc.language.text.symbol_column import read_kinds
 
-INSTRUCTIONS = Path(__file__).parent / "instructions.txt"
+NAMES = read_kinds(Path(__file__).with_name("instructions.txt"))
+"""Names of instructions and functions by what they do."""
 
 
 @dataclass(frozen=True)
@@ -43,35 +49,17 @@ class Signature:
         )
 
 
-POINT, ARC = Signature(), Signature(to=1, via=0)
-JOINTS = Signature(joints=True)
-SEARCH = Signature(to=2, reaches=False, given=1)  # signal, where it came, destination
-ARC_SEARCH = Signature(to=3, via=2, reaches=False, given=1)
-
-_KINDS: Mapping[Signature, str] = {
-    POINT: """
-        MoveJ MoveL MoveJDO MoveLDO MoveJAO MoveLAO MoveJGO MoveLGO MoveJSync MoveLSync
-        TriggJ TriggL TriggJIOs TriggLIOs
-        ArcL ArcLStart ArcLEnd ArcMoveJ ArcMoveL
-        ArcL1 ArcL1Start ArcL1End ArcL2 ArcL2Start ArcL2End
-        CalibJ CalibL NutJ NutL
-        SpotJ SpotL SpotMJ SpotML PaintL DispL CapL
-    """,
-    ARC: """
-        MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
-        ArcC ArcCStart ArcCEnd ArcMoveC
-        ArcC1 ArcC1Start ArcC1End ArcC2 ArcC2Start ArcC2End PaintC DispC CapC
-    """,
-    JOINTS: "MoveAbsJ TriggAbsJ ArcMoveAbsJ",
-    Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
-    SEARCH: "SearchL",
-    ARC_SEARCH: "SearchC",
-    Signature(to=2, joints=True, reaches=False, given=1): "SearchExtJ",
+_SIGNATURES = {
+    "point": Signature(),
+    "arc": Signature(to=1, via=0),
+    "joints": Signature(joints=True),
+    "axes": Signature(joints=True, reaches=False),  # the arm stays
+    "search": Signature(to=2, reaches=False, given=1),  # signal, where it came
+    "arc-search": Signature(to=3, via=2, reaches=False, given=1),
+    "joint-search": Signature(to=2, joints=True, reaches=False, given=1),
 }
 MOTIONS: Mapping[str, Signature] = {
-    name.lower(): signature
-    for signature, names in _KINDS.items()
-    for name in names.split()
+    name: signature for kind, signature in _SIGNATURES.items() for name in NAMES[kind]
 }
 
 
@@ -86,62 +74,56 @@ def read_known_instructions() -> Mapping[str, str]:
     >>> read_known_instructions()["tpwrite"], read_known_instructions()["pdispon"]
     ('still', 'modal')
     """
-    found: dict[str, str] = {}
-    for line in INSTRUCTIONS.read_text(encoding="utf-8").splitlines():
-        kind, _, names = line.partition(":")
-        if not line.startswith("#"):
-            found |= dict.fromkeys(names.lower().split(), kind)
-    return found
+    return {name: kind for kind in ("still", "modal", "left") for name in NAMES[kind]}
 
 
-READING = frozenset(
-    """
-    tperase tpwrite uimsgwrite set reset setdo setgo setao setdosync pulsedo invertdo
-    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob errlog errwrite
-    confj confl singarea cirpathmode accset velset speedrefresh worldacclim pathacclim
-    motionsup pdispon pdispset pdispoff eoffson eoffsset eoffsoff gripload
-    mechunitload actunit deactunit softact softdeact stopmove startmove
-    corrcon corrdiscon write open close isleep iwatch idelete
-    """.split()
-)
-"""Instructions that change none of the data that they are given, but by `ANSWERS`."""
+READING, WAITING = NAMES["reading"], NAMES["waiting"]
 
 ANSWERS = frozenset(
     ["timeflag", "valueattimeout", "taskno", "mectaskno", "errornumber"]
 )
 """Options that instructions and functions answer in."""
 
-BUILT_IN_FUNCTIONS = frozenset(
-    """
-    abs acos asin atan atan2 cos sin tan exp pow round sqrt trunc dim
-    offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
-    defframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
-    calcjointt numtostr strlen strpart valtostr ctime cdate clkread gettime
-    ainput aoutput dinput doutput ginput ginputdnum goutput goutputdnum testdi
-    valid present ispers isvar opmode runmode execlevel
-    isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
-    stringmatch strfind strmap strmatch strorder gettaskname robos
-    """.split()
-)
-"""Functions that neither move nor change what they are given, but by `ANSWERS`."""
+BUILT_IN_FUNCTIONS = NAMES["function"]
 
 STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
 """Functions that do not move."""
-
-WAITING = frozenset(
-    """
-    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob waitsynctask
-    waittestandset waitload stop break systemstopaction stopmove
-    tpreadfk tpreadnum tpreaddnum uimsgbox uimessagebox uilistview uinumentry
-    uidnumentry uinumtune uidnumtune uialphaentry
-    socketaccept socketconnect socketreceive socketreceivefrom rmqreadwait rmqsendwait
-    camgetresult camloadjob camwaitloadjob stclose stopen stcalib openhighlift
-    closehighlift readstr readnum readbin readrawbytes readanybin readstrbin
-    """.split()
-)
-"""What may take so long that the arm stops at a point with a zone before it."""
 
 SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
 BY_NAME = "callbyvar"
 BY_STRING = frozenset(["setdataval", "setalldataval"])
 """Instructions that change data whose names they are given in strings."""
+
+# Data that the controller gives names to.
+
+_UPRIGHT = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+_NO_LOAD = 0.001, (0.0, 0.0, 0.001), _UPRIGHT[1], 0.0, 0.0, 0.0
+_BUILT_IN: Mapping[str, tuple[Any, str]] = {
+    "true": (1.0, "bool"), "false": (0.0, "bool"), "pi": (math.pi, "num"),
+    "tool0": ((1.0, _UPRIGHT, _NO_LOAD), "tooldata"), "load0": (_NO_LOAD, "loaddata"),
+    "wobj0": ((0.0, 1.0, "", _UPRIGHT, _UPRIGHT), "wobjdata"),
+    "fine": ((1.0, 0.0), "zonedata"),
+}  # fmt: skip
+Z0 = 0.3  # [mm]
+
+
+@cache
+def read_controller_data(name: str) -> tuple[Value, str] | None:
+    """Return data of the controller, as far as moves take them, and their type.
+
+    >>> read_controller_data("z0")[0][1].value, read_controller_data("zone")
+    (0.3, None)
+    """
+    found, usual = _BUILT_IN.get(name), re.match(r"([vz])(\d+)$", name)
+    if usual is not None:
+        size = float(usual[2])
+        zone = (0.0, size or Z0), "zonedata"
+        found = zone if usual[1] == "z" else ((size,), "speeddata")
+    return None if found is None else (_as_values(found[0]), found[1])
+
+
+def _as_values(data: Any) -> Value:
+    """Return nested numbers and texts as values."""
+    if isinstance(data, tuple):
+        return tuple(map(_as_values, data))
+    return data if isinstance(data, str) else WrittenNumber(data)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, TypeGuard
 
 from postproc.diagnostics import Code, Reason
@@ -38,7 +37,7 @@ from postproc.language.rapid.modal_state import (
     RapidModeReader,
 )
 from postproc.language.rapid.moves import (
-    Goals,
+    RapidGoal,
     are_targets,
     own_numbers,
     pose_of,
@@ -67,6 +66,7 @@ class RapidMachine(TaskMachine):
     """
 
     procedures = ("proc",)
+    reader = RapidGoal
     acting = (ir.Instruction,)
     passed = _PLAIN
     task: RapidTask = field(kw_only=True)
@@ -74,11 +74,6 @@ class RapidMachine(TaskMachine):
     restarts: list[Arrived] = field(default_factory=list)
     _handlers: dict[tuple[int, int], errors.ErrorHandlers] = field(default_factory=dict)
     _exits: dict[Context, tuple[errors.ErrorExit, ...]] = field(default_factory=dict)
-
-    @cached_property
-    def goals(self) -> Goals:
-        """What reads destinations, tools, work objects and zones."""
-        return Goals(self.task)
 
     def run(self) -> None:
         """Follow every way from the main routine."""
@@ -332,7 +327,7 @@ class RapidMachine(TaskMachine):
             return here
         if name == BY_NAME:
             self._run_all_beside()
-        if kind == "left" and name not in self.start.routines:
+        if kind == "left" and name not in self.task.start.routines:
             return self.unknown(at, here, _LEFT)
         return self.outside(at, name, here)
 
@@ -341,7 +336,7 @@ class RapidMachine(TaskMachine):
         return RapidModeReader(
             lambda operand: self.task.number(operand, scope),
             lambda operand: pose_of(self.task.value(operand, scope)),
-            lambda operand: self.goals.load(operand, scope),
+            RapidGoal(self.task, scope).load,
         )  # fmt: skip
 
     def _move(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived:

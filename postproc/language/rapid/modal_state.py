@@ -8,7 +8,8 @@ from typing import Any
 
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.modal_state import ModalState
+from postproc.language.analysis.conditions import ModalState
+from postproc.language.rapid.instructions import NAMES
 from postproc.language.visits import OrientationLaw, Switch
 
 NO_SHIFT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position [mm] and quaternion
@@ -130,15 +131,7 @@ BLOCKING = {
 _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
 ONE_OF_MANY = frozenset(["corrcon", "corrdiscon", "waitwobj", "dropwobj"])
 """Those of them that begin and end one of several: what they name tells which."""
-# They change nothing of where a target is and from which side it is reached.
-HARMLESS = frozenset(
-    """
-    accset speedrefresh worldacclim pathacclim pathresol motionsup
-    motionprocessmodeset cornerpathwarning
-    mechunitload actunit deactunit corrwrite tuneservo tunereset stopmove
-    startmove
-    """.split()
-)
+HARMLESS = NAMES["harmless"]
 
 
 Read = Callable[[ir.Operand | None], tuple[float, ...]]

@@ -13,14 +13,15 @@ from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
-from postproc.language.analysis.assigned_points import Points, Scope
-from postproc.language.analysis.conditions import compose_poses
-from postproc.language.analysis.found_visits import (
-    FoundGoal,
-    FoundVisit,
-    not_reached,
+from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.conditions import TaskFrame, compose_poses
+from postproc.language.analysis.found_goals import FoundGoal, not_reached
+from postproc.language.analysis.values import (
+    Value,
+    WrittenNumber,
+    list_leaves,
+    number_in,
 )
-from postproc.language.analysis.values import Value, WrittenNumber, list_leaves
 from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT, WIDTH
@@ -30,13 +31,10 @@ from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
 UNUSED = 1e8  # values of external axes from here on (9E9) say that there is none
-_ZONE = re.compile(r"z(\d+)$")
-_SPEED = re.compile(r"v(\d+)$")
 _STEM = re.compile(
     r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search|calib|nut)"
 )
 SHORTEST = 0.5  # length of what counts as a quaternion
-Z0 = 0.3  # [mm]
 PLACEHOLDER = 0.01  # [kg] masses up to here, as of tool0, state nothing
 UNKNOWN_ZONE = -1.0
 # Options whose moves are left.
@@ -69,73 +67,55 @@ _CARRIED = Reason(
 )
 
 
-@dataclass(frozen=True)
-class FrameOfMove:
-    """A tool or a work object.
-
-    Attributes:
-        pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
-            is not known.
-        held: Robhold: the arm holds it.
-        why: Why targets with it cannot be compensated.
-        taught: It was taught with the arm, and contains its error.
-        load: Of a tool: mass [kg] and its centre in the flange frame [mm]; empty where
-            the numbers are a placeholder, or not known.
-    """
-
-    pose: Pose
-    held: bool
-    why: Reason = NO_REASON
-    taught: bool = False
-    load: tuple[float, ...] = ()
-
-
 @dataclass
-class RapidVisit(FoundVisit):
+class RapidVisit(goals.FoundVisit):
     r"""One arrival, as it is found.
 
     Attributes:
         tool, wobj: Its frames.
-        total: What ``\TLoad`` says that the arm carries in all, as `FrameOfMove.load`.
+        total: What ``\TLoad`` says that the arm carries in all, as `TaskFrame.load`.
         zone_mm: Size of its zone, NaN where it stops.
         speed: Along the path [m/s], NaN where not known.
     """
 
-    tool: FrameOfMove = field(kw_only=True)
-    wobj: FrameOfMove = field(kw_only=True)
+    tool: TaskFrame = field(kw_only=True)
+    wobj: TaskFrame = field(kw_only=True)
     zone_mm: float = field(kw_only=True)
     speed: float = field(kw_only=True)
     total: tuple[float, ...] = field(kw_only=True, default=())
 
 
-@dataclass
-class Goals:
-    """Reads the arguments of moves; frames by name are read once."""
+WORLD = TaskFrame(IDENTITY)
+
+
+@dataclass(frozen=True)
+class RapidGoal(goals.GoalReader):
+    """Reads where moves lead; frames by name are read once."""
 
     task: RapidTask
-    _frames: dict[tuple[object, ...], FrameOfMove] = field(default_factory=dict)
-    _known: dict[tuple[object, ...], tuple[FrameOfMove, FrameOfMove, float, float]] = (
-        field(default_factory=dict)
-    )
-    _slots: dict[int, tuple[ir.Composite, list[int]]] = field(default_factory=dict)
+    dialect = RAPID_DIALECT
+    brackets = "{}"
+    system = "it stands in a system module, which is read and not rewritten"
+
+    # Moves.
 
     def visits(
-        self, one: ir.Instruction, scope: Scope, modes: Modes, points: Points
+        self, one: ir.Instruction, scope: Scope, modes: Modes
     ) -> Iterator[RapidVisit]:
-        """Read the visits of a move: the point of an arc, and its end."""
+        """Read the visits of a move, see `GoalReader.visits`."""
         signature = MOTIONS[one.name]
         ends = signature.operands(one.arguments)
-        there = replace(scope, points=points) if points.routines else scope
-        tool, wobj, zone, speed = self._conditions(one, ends, there)
+        tool, wobj, zone, speed = self._conditions(one, ends)
         motion = _motion(one.name, signature)
-        reader = RapidGoal(self.task, there, signature.joints, self._slots)
         why = _SEARCH if one.name.startswith("search") else _STAYS
         why = NO_REASON if signature.reaches else why
         why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
-        total, untold = self._total(one, there)
+        total, untold = self._total(one)
         why = why or untold
         for via in (True, False) if signature.via >= 0 else (False,):
-            goal = reader.goal(ends[via])
+            goal = self.goal(ends[via])
+            if goal.target == (Meaning.POSE if signature.joints else Meaning.JOINTS):
+                goal = self.unknown(goals.AT_RUN_TIME, goal.name)
             if not (via or signature.reaches):
                 goal = not_reached(goal, why)
             yield RapidVisit(
@@ -143,126 +123,130 @@ class Goals:
                 tool=tool, wobj=wobj, zone_mm=zone, speed=speed, total=total,
             )  # fmt: skip
 
-    def load(self, operand: ir.Operand | None, scope: Scope) -> tuple[float, ...]:
+    def load(self, operand: ir.Operand | None) -> tuple[float, ...]:
         """Read mass [kg] and centre [mm] of loaddata, empty where they are not known.
 
         ``load0`` and other loads up to a hundredth of a kilogram are no load.
         """
-        operand, scope = self.task.behind(operand, scope)
-        if isinstance(operand, ir.DataObject) and operand.name == "load0":
-            if not operand.steps and "load0" not in self.task.declared:
-                return EMPTY_HAND
-        found = load_of(self.task.value(operand, scope))
+        found = load_of(self.task.value(operand, self.here))
         return EMPTY_HAND if found and found[0] <= PLACEHOLDER else found
 
-    def _total(
-        self, one: ir.Instruction, scope: Scope
-    ) -> tuple[tuple[float, ...], Reason]:
+    def _total(self, one: ir.Instruction) -> tuple[tuple[float, ...], Reason]:
         r"""Read ``\TLoad``: all that the arm carries, and why that is not known."""
         given = [argument for argument in one.arguments if argument.name == "tload"]
         if not given:
             return (), NO_REASON
-        found = self.load(given[0].value, scope)
+        found = self.load(given[0].value)
         if not found or given[0].passed_on:
             return (), _LOAD_UNKNOWN
         return (() if found == EMPTY_HAND else found), NO_REASON
 
     def _conditions(
-        self, one: ir.Instruction, ends: Sequence[ir.Operand | None], scope: Scope
-    ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
+        self, one: ir.Instruction, ends: Sequence[ir.Operand | None]
+    ) -> tuple[TaskFrame, TaskFrame, float, float]:
         """Read tool, work object, zone [mm] and speed [m/s] of a move.
 
         Moves that only name them, and name the same, have the same.
         """
         own = [a for a in one.arguments if all(a.value is not e for e in ends)]
-        named = all(
-            value is None or (isinstance(value, ir.DataObject) and not value.steps)
-            for value in (a.value for a in own)
-        ) and not any(self._is_assigned(a.value) for a in own)
-        stops = one.name in AT_A_STOP
+        named = all(a.value is None or self._is_fixed(a.value) for a in own)
+        stops, scope, known = one.name in AT_A_STOP, self.here, self.task.conditions
         key = stops, *own, *scope.place, scope.loops, scope.given
-        if named and key in self._known:
-            return self._known[key]
-        arguments = _Arguments(self.task, one.arguments, scope)
-        zone = np.nan if stops else arguments.zone()
-        operand = arguments.option("wobj")
-        wobj = WORLD if operand is None else self._frame("wobj", operand, arguments)
-        operand = arguments.of_type("tooldata")
-        tool = FrameOfMove((), True, _NO_TOOL)
+        if named and key in known:
+            return known[key]
+        zone = np.nan if stops else self._zone(one.arguments)
+        operand = _find_option(one.arguments, "wobj")
+        wobj = WORLD if operand is None else self._frame("wobj", operand)
+        operand = self._find_argument(one.arguments, "tooldata")
+        tool = TaskFrame((), _NO_TOOL)
         if operand is not None:
-            tool = self._frame("tool", operand, arguments)
-        found = tool, wobj, zone, arguments.speed()
+            tool = self._frame("tool", operand)
+        found = tool, wobj, zone, self._speed(one.arguments)
         if named:
-            self._known[key] = found
+            known[key] = found
         return found
 
     # Tools and work objects.
 
-    def _is_assigned(self, operand: ir.Operand | None) -> bool:
-        """Return True if the program may give data another value on its way."""
-        return isinstance(operand, ir.DataObject) and operand.name in self.task.written
-
-    def _frame(
-        self, kind: str, operand: ir.Operand, arguments: _Arguments
-    ) -> FrameOfMove:
+    def _frame(self, kind: str, operand: ir.Operand) -> TaskFrame:
         """Read a tool or a work object, by name once for each place it may mean."""
-        found, scope = self.task.behind(operand, arguments.scope)
-        operand = operand if found is None else found
-        arguments = replace(arguments, scope=scope)
-        if isinstance(operand, ir.DataObject) and not operand.steps:
-            if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
-                return FLANGE if kind == "tool" else WORLD
-            key = kind, operand.name, *scope.place
-            if self._is_assigned(operand):
-                return self._read_frame(kind, operand, arguments)
-            if key not in self._frames:
-                self._frames[key] = self._read_frame(kind, operand, arguments)
-            return self._frames[key]
-        return self._read_frame(kind, operand, arguments)
-
-    def _read_frame(
-        self, kind: str, operand: ir.Operand, arguments: _Arguments
-    ) -> FrameOfMove:
-        name = operand.name if isinstance(operand, ir.DataObject) else f"the {kind}"
-        found = self.task.value(operand, arguments.scope)
+        named, scope = self.task.behind(operand, self.here)
+        key, fixed = (kind, named, *scope.place), self._is_fixed(named)
+        if fixed and key in self.task.frames:
+            return self.task.frames[key]
+        name = named.name if isinstance(named, ir.DataObject) else f"the {kind}"
+        found = self.task.value(named, scope)
         read = _tool_of(found) if kind == "tool" else _wobj_of(found)
         if read is None:
-            there = RapidGoal(self.task, arguments.scope, False, self._slots)
-            why = there.explain_unknown(name)
+            why = self.at(scope).explain_unknown(name)
             if why.code is Code.RUNTIME_VALUE:
                 why = replace(why, code=Code.FRAME_UNKNOWN)
-            return FrameOfMove((), kind == "tool", why)
-        return replace(read, taught=self.task.is_taught(name, found))
+            read = TaskFrame((), why)
+        else:
+            read = replace(read, taught=self.task.is_taught(name, found))
+        if fixed:
+            self.task.frames[key] = read
+        return read
 
+    def _is_fixed(self, operand: ir.Operand | None) -> bool:
+        """Return True if an operand is data by name that nothing changes."""
+        match operand:
+            case ir.DataObject(name=name, steps=()):
+                return name not in self.task.written
+        return False
 
-WORLD = FrameOfMove(IDENTITY, False)
-FLANGE = FrameOfMove(IDENTITY, True)
+    # Zones and speeds.
 
+    def _find_argument(
+        self, arguments: Sequence[ir.Argument], type_: str
+    ) -> ir.Operand | None:
+        """Return the only argument by place that is data of a type."""
+        placed = (one.value for one in arguments if not one.name)
+        found = [one for one in placed if self._type(one) == type_]
+        return found[0] if len(found) == 1 else None
 
-@dataclass(frozen=True)
-class RapidGoal(goals.GoalReader):
-    """Reads the ends of one move.
+    def _type(self, operand: ir.Operand | None) -> str:
+        operand, scope = self.task.behind(operand, self.here)
+        if not isinstance(operand, ir.DataObject):
+            return ""
+        found = self.task.datum(operand.name, scope)
+        given = self.task.controller_data(operand.name) or (None, "")
+        return given[1] if found is None else found[1].type
 
-    Attributes:
-        joints: They are jointtargets.
-        slots: Of points that are written in moves, by the identity of these.
-    """
+    def _numbers(self, arguments: Sequence[ir.Argument], type_: str) -> list[float]:
+        """Return the first two numbers of the only argument of a type, NaN for none."""
+        found = self.task.value(self._find_argument(arguments, type_), self.here)
+        return [number_in(one) for one in (*list_leaves(found), None, None)][:2]
 
-    task: RapidTask
-    joints: bool
-    slots: dict[int, tuple[ir.Composite, list[int]]]
-    dialect = RAPID_DIALECT
-    brackets = "{}"
-    system = "it stands in a system module, which is read and not rewritten"
+    def _zone(self, arguments: Sequence[ir.Argument]) -> float:
+        """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
+        if any(one.name == "inpos" for one in arguments):
+            return np.nan  # stop-point data stand instead of the zone
+        size = _find_option(arguments, "z")
+        stops, tcp = self._numbers(arguments, "zonedata")
+        if size is not None:
+            own = self.task.number(size, self.here)
+            return own if own >= 0.0 and stops != 1.0 else UNKNOWN_ZONE
+        if np.isnan(stops + tcp):
+            return UNKNOWN_ZONE
+        return np.nan if stops else tcp
 
-    def read_value(self, value: Value | None, name: str) -> FoundGoal | None:
+    def _speed(self, arguments: Sequence[ir.Argument]) -> float:
+        """Return the speed along a path [m/s], NaN where it is not known."""
+        own = _find_option(arguments, "v")
+        if own is not None:
+            return self.task.number(own, self.here) / 1000.0
+        return self._numbers(arguments, "speeddata")[0] / 1000.0
+
+    # Points.
+
+    def read_value(self, value: Value | None) -> FoundGoal | None:
         """Take a robtarget or jointtarget apart."""
-        counts = _COUNTS[self.joints]
-        if not isinstance(value, tuple) or len(value) != len(counts):
+        if not isinstance(value, tuple):
             return None
         parts = [[*list_leaves(part)] for part in value]
         own = [[x for x in part if isinstance(x, WrittenNumber)] for part in parts]
-        if own != parts or tuple(map(len, own)) != counts:
+        if own != parts or tuple(map(len, own)) not in _COUNTS:
             return None
         numbers = [one for part in own[:-1] for one in part]
         slots = goals.list_slots(numbers, WIDTH)
@@ -273,9 +257,10 @@ class RapidGoal(goals.GoalReader):
     def _goal_of(self, numbers: list[float], outside: list[float]) -> FoundGoal:
         """Return where numbers and external axes lead."""
         values = numbers + [0.0] * (WIDTH - len(numbers))
-        known = self.joints or _is_unit(values[3:7])
+        joints = len(numbers) < WIDTH
+        known = joints or _is_unit(values[3:7])
         return FoundGoal(
-            Meaning.JOINTS if self.joints else Meaning.POSE, tuple(values),
+            Meaning.JOINTS if joints else Meaning.POSE, tuple(values),
             aux=tuple(np.nan if abs(value) > UNUSED else value for value in outside),
             why=NO_REASON if known else _NO_QUATERNION,
         )  # fmt: skip
@@ -299,18 +284,19 @@ class RapidGoal(goals.GoalReader):
         self, written: ir.Composite, file: int, row: int
     ) -> FoundGoal | None:
         """Read a point that is written in numbers alone, None for any other."""
-        if id(written) not in self.slots:
-            self.slots[id(written)] = written, _plain_slots(written)
-        slots, count = self.slots[id(written)][1], 6 if self.joints else 11
-        if len(slots) != count + 6:
+        known = self.task.written_points
+        if id(written) not in known:
+            known[id(written)] = written, _plain_slots(written)
+        slots = known[id(written)][1]
+        if not slots:
             return None
         text = self.task.files[file].text
         at = [int(text.first[row]) + slot for slot in slots]
-        values = text.value[at].tolist()
+        values, count = text.value[at].tolist(), len(slots) - 6
         found = self._goal_of(values[:count], values[count:])
         if not np.isfinite(values).all() or found.why:
             return None
-        begin = self.task.first_slots[file]
+        begin = self.task.numbering.first[file]
         own = [begin + slot for slot in at[:count]]
         return replace(found, slots=(*own, *(-1,) * (WIDTH - count)))
 
@@ -318,7 +304,7 @@ class RapidGoal(goals.GoalReader):
         """Read Offs and RelTool: the point is moved along."""
         if not isinstance(operand, ir.FunctionCall) or operand.name not in SHIFTS:
             return None
-        if operand.name in self.task.routines or self.joints:
+        if operand.name in self.task.routines:
             return None
         name, arguments = operand.name, operand.arguments
         by = self.task.read_shift(arguments, self.here)
@@ -326,10 +312,10 @@ class RapidGoal(goals.GoalReader):
             return self.unknown(goals.AT_RUN_TIME)
         turns = {one.name: one.value for one in arguments}
         placed = [one.value for one in arguments if not one.name]
-        base = replace(self, joints=False).goal(placed[0])
+        base = self.goal(placed[0])
         written = [*placed[1:], *(turns.get(axis) for axis in ("rx", "ry", "rz"))]
         first = int(self.task.files[self.here.file].text.first[self.here.row])
-        first += self.task.first_slots[self.here.file]
+        first += self.task.numbering.first[self.here.file]
         slots = [first + n.slot if isinstance(n, ir.Num) else -1 for n in written]
         own = frozenset(slots[:1] if slots[0] >= 0 else [])
         shifts, turned = f"{name} shifts it by what", f"{name} turns it"
@@ -382,97 +368,9 @@ class RapidGoal(goals.GoalReader):
         return ""
 
 
-@dataclass
-class _Arguments:
-    """The arguments of a move.
-
-    Attributes:
-        task: The modules.
-        arguments: All of them.
-        scope: Where the move stands.
-    """
-
-    task: RapidTask
-    arguments: Sequence[ir.Argument]
-    scope: Scope
-
-    def option(self, name: str) -> ir.Operand | None:
-        r"""Return the value of ``\name:=value``, None where it is not there."""
-        found = (one for one in self.arguments if one.name == name)
-        return next((one.value for one in found), None)
-
-    def of_type(self, type_: str) -> ir.Operand | None:
-        """Return the only argument by place that is data of a type."""
-        found = [
-            one.value
-            for one in self.arguments
-            if not one.name and self._type(one.value) == type_
-        ]
-        return found[0] if len(found) == 1 else None
-
-    def _type(self, operand: ir.Operand | None) -> str:
-        operand, scope = self.task.behind(operand, self.scope)
-        if not isinstance(operand, ir.DataObject):
-            return ""
-        found = self.task.datum(operand.name, scope)
-        if found is not None:
-            return found[1].type
-        if operand.name == "tool0":
-            return "tooldata"
-        if operand.name == "fine" or _ZONE.match(operand.name):
-            return "zonedata"
-        return "speeddata" if _SPEED.match(operand.name) else ""
-
-    def _find_argument(self, type_: str) -> tuple[ir.DataObject | None, _Arguments]:
-        """Return the only argument of a type, and the arguments where it stands."""
-        found = self.task.behind(self.of_type(type_), self.scope)
-        named = found[0] if isinstance(found[0], ir.DataObject) else None
-        return named, replace(self, scope=found[1])
-
-    def is_built_in(self, name: str) -> bool:
-        """Tell whether a name is the controller's: no data, no parameter has it."""
-        hidden = name in self.task.declared or name in self.scope.parameters
-        return not (hidden or self.task.place(name, self.scope))
-
-    def zone(self) -> float:
-        """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
-        if any(one.name == "inpos" for one in self.arguments):
-            return np.nan  # stop-point data stand instead of the zone
-        size = self.option("z")
-        operand, there = self._find_argument("zonedata")
-        if size is not None:
-            fine = operand is not None and operand.name == "fine"
-            own = self.task.number(size, self.scope)
-            return own if own >= 0.0 and not fine else UNKNOWN_ZONE
-        if operand is None:
-            return UNKNOWN_ZONE
-        if operand.name == "fine":
-            return np.nan
-        usual = _ZONE.match(operand.name)
-        if usual and there.is_built_in(operand.name):
-            return float(usual[1]) or Z0
-        found = self.task.value(operand, there.scope)
-        if isinstance(found, tuple) and len(found) >= 2:
-            stops, tcp = found[:2]
-            if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
-                return np.nan if stops.value else tcp.value
-        return UNKNOWN_ZONE
-
-    def speed(self) -> float:
-        """Return the speed along a path [m/s], NaN where it is not known."""
-        own = self.option("v")
-        if own is not None:
-            return self.task.number(own, self.scope) / 1000.0
-        operand, there = self._find_argument("speeddata")
-        if operand is None:
-            return np.nan
-        usual = _SPEED.match(operand.name)
-        if usual and there.is_built_in(operand.name):
-            return float(usual[1]) / 1000.0
-        found = self.task.value(operand, there.scope)
-        if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
-            return found[0].value / 1000.0
-        return np.nan
+def _find_option(arguments: Sequence[ir.Argument], name: str) -> ir.Operand | None:
+    r"""Return the value of ``\name:=value``, None where it is not there."""
+    return next((one.value for one in arguments if one.name == name), None)
 
 
 @cache
@@ -544,11 +442,11 @@ def pose_of(found: Value | None) -> tuple[float, ...]:
 
 
 def pose_of_numbers(numbers: Sequence[float]) -> Pose:
-    """Convert the seven numbers of a pose; see `FrameOfMove.pose`."""
+    """Convert the seven numbers of a pose; see `TaskFrame.pose`."""
     return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
 
 
-def _tool_of(found: Value | None) -> FrameOfMove | None:
+def _tool_of(found: Value | None) -> TaskFrame | None:
     """Read ``[robhold, [[x,y,z],[q1..q4]], [load]]``."""
     if not isinstance(found, tuple) or len(found) < 2:
         return None
@@ -557,7 +455,7 @@ def _tool_of(found: Value | None) -> FrameOfMove | None:
         return None
     load = load_of(found[2]) if len(found) > 2 else ()
     stated = load if load and load[0] > PLACEHOLDER else ()
-    return FrameOfMove(pose_of_numbers(pose), bool(held.value), load=stated)
+    return TaskFrame(pose_of_numbers(pose), remote=not held.value, load=stated)
 
 
 def load_of(found: Value | None) -> tuple[float, ...]:
@@ -572,7 +470,7 @@ def load_of(found: Value | None) -> tuple[float, ...]:
     return (mass.value, *at) if known else ()
 
 
-def _wobj_of(found: Value | None) -> FrameOfMove | None:
+def _wobj_of(found: Value | None) -> TaskFrame | None:
     """Read ``[robhold, ufprog, "ufmec", [uframe], [oframe]]``."""
     if not isinstance(found, tuple) or len(found) != 5:
         return None
@@ -586,4 +484,4 @@ def _wobj_of(found: Value | None) -> FrameOfMove | None:
     ):
         why = _CARRIED
     pose = compose_poses(pose_of_numbers(user), pose_of_numbers(object_))
-    return FrameOfMove(pose, bool(held.value), why)
+    return TaskFrame(pose, why, remote=bool(held.value))

@@ -8,6 +8,7 @@ from typing import Any
 
 from postproc.language import ir
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.instructions import NAMES
 from postproc.language.text.common_rules import COMMON, build_call, low, part, parts
 from postproc.language.text.template_parser import Children, FormParser, Word
 
@@ -92,15 +93,7 @@ LONGEST = 1 << 18  # characters of a form; arrays of a thousand targets have 60,
 DEEPEST = 200  # operators or brackets within each other; followed by recursion
 
 
-RESERVED = frozenset(
-    "alias and backward case connect const default div do else elseif endfor endfunc "
-    "endif endmodule endproc endrecord endtest endtrap endwhile error exit for from "
-    "func goto if inout local mod module not or pers proc raise record retry "
-    "return step test then to trap trynext undo var while with xor".split()
-)
-"""Words that name nothing, but for attributes of a module."""
-
-_PARSER = FormParser("rapid", RULES, RESERVED, LONGEST, DEEPEST)
+_PARSER = FormParser("rapid", RULES, NAMES["reserved"], LONGEST, DEEPEST)
 
 
 @lru_cache(maxsize=8192)

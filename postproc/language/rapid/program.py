@@ -17,7 +17,7 @@ from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import MOTIONS
 from postproc.language.rapid.parser import parse_statement
 from postproc.language.rapid.syntax import CompactIf, ModuleHead, RecordHead
-from postproc.language.text.blocks import BlockWords, Outline
+from postproc.language.text.blocks import INNER, BlockWords, Outline
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
 
@@ -25,11 +25,9 @@ _SYSTEM = "sysmodule"
 _ROUTINES = ("proc", "func", "trap")
 _WORDS = BlockWords(
     ends={
-        "endmodule": "module", "endproc": "proc", "endfunc": "func", "endtrap": "trap",
-        "endrecord": "record", "endif": "if", "endfor": "for", "endwhile": "while",
-        "endtest": "test",
+        **INNER, "endmodule": "module", "endproc": "proc", "endfunc": "func",
+        "endtrap": "trap", "endrecord": "record",
     },
-    within={"elseif": "if", "else": "if", "case": "test", "default": "test"},
     scopes=("module", *_ROUTINES, "record"),
     outer=("module",),
     routines=_ROUTINES,

@@ -7,10 +7,10 @@ from collections import defaultdict
 from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
+from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
@@ -31,6 +31,7 @@ from postproc.language.rapid.instructions import (
     MOTIONS,
     READING,
     SYNCHRONOUS,
+    read_controller_data,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, inside
@@ -69,14 +70,27 @@ _READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 
 
 @dataclass
 class RapidTask(TaskSymbols[RapidFile]):
-    """The modules of a task."""
+    """The modules of a task.
+
+    Attributes:
+        written_points: Slots of points in numbers, by the identity of these.
+        frames, conditions: Tools and work objects that have been read, by name; and
+            with zones and speeds, by arguments.
+    """
 
     comments = COMMENTS
     layouts = RECORDS
     followed = (*RECORDS, "num", "bool")
     targets = ("robtarget", "jointtarget")
-    constants: ClassVar = {"true": 1.0, "false": 0.0, "pi": math.pi}
     functions = "func"
+    controller_data = staticmethod(read_controller_data)
+    written_points: dict[int, tuple[ir.Composite, list[int]]] = field(
+        default_factory=dict
+    )
+    frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
+    conditions: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = (
+        field(default_factory=dict)
+    )
     _moved: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     def new_uses(self) -> NamesUsed:
@@ -128,16 +142,16 @@ class RapidTask(TaskSymbols[RapidFile]):
             name: Of the data, with an index where it has one; "" for numbers in a move.
             found: What they hold.
         """
-        if name.split("{")[0].strip().lower() in self.taught:
+        if name.split("{")[0].strip().lower() in self.start.taught:
             return True
         one = found
         while isinstance(one, tuple) and one:
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
             return False
-        file = self.file_of(one.slot)
+        file = self.numbering.file_of(one.slot)
         text = self.files[file].text
-        row = text.row_of(one.slot - self.first_slots[file])
+        row = text.row_of(one.slot - self.numbering.first[file])
         return not self.taught_lines[file].isdisjoint(text.lines(row))
 
     # What other tasks do: global persistents of one name are the same data.

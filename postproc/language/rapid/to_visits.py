@@ -9,6 +9,7 @@ from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import (
     NO_LOAD,
     Conditions,
+    TaskFrame,
     cell_pose,
     compose_poses,
 )
@@ -17,7 +18,6 @@ from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modal_state import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
     UNKNOWN_ZONE,
-    FrameOfMove,
     RapidVisit,
     pose_of_numbers,
 )
@@ -52,9 +52,9 @@ class RapidCollector(to_visits.TaskCollector):
     def __init__(self, machine: RapidMachine) -> None:
         """Find where the arm may stop although a zone is written."""
         super().__init__(machine)
-        self.base = cell_pose(machine.start.base)
+        self.base = cell_pose(machine.task.start.base)
         self.paused = {id(machine.visits[k]) for k in machine.find_unsure_stops()}
-        self.placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
+        self.placed: dict[tuple[TaskFrame, Pose], Pose] = {}
 
     def arrive(self, v: RapidVisit) -> Arrival:
         """Say what an arrival is carried out with."""
@@ -78,7 +78,7 @@ def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Condit
         base=base,
         uframe=uframe,
         taught=(v.tool.taught, False, v.wobj.taught),
-        tool_remote=not v.tool.held or v.wobj.held,
+        tool_remote=v.tool.remote or v.wobj.remote,
         care=(v.modes.confj if joint else v.modes.confl,) * 3,
         orientation_law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
         zone=zone_at(v.via, v.zone_mm, unsized=unsized),

@@ -9,11 +9,14 @@ from typing import Any, TypeVar
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language import ir
-from postproc.language.analysis.control_flow import HeadedRows
+from postproc.language.analysis.control_flow import ENDS, HeadedRows
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
+
+INNER = {end: kind for kind, end in ENDS.items()}
+DIVIDED = {"elseif": "if", "else": "if", "case": "test", "default": "test"}
 
 
 @dataclass(frozen=True)
@@ -22,14 +25,12 @@ class BlockWords:
 
     Attributes:
         ends: From a word to the kind of block that it ends.
-        within: From a word to the kind of block that it divides.
         scopes: Kinds of modules, routines and records.
         outer: Those of them that hold others.
         routines: Those that run.
     """
 
     ends: Mapping[str, str]
-    within: Mapping[str, str]
     scopes: Collection[str]
     outer: Collection[str]
     routines: Collection[str]
@@ -108,13 +109,10 @@ class Outline:
     def word(self, word: str, row: int) -> None:
         """Divide or end a block."""
         kinds = [kind for kind, _, _ in self._open]
-        if word in self.words.within:
-            if kinds[-1:] != [self.words.within[word]]:
-                self.complain(
-                    row,
-                    Code.OPEN_BLOCK,
-                    f"stands in no {self.words.within[word].upper()}",
-                )
+        if word in DIVIDED:
+            if kinds[-1:] != [DIVIDED[word]]:
+                text = f"stands in no {DIVIDED[word].upper()}"
+                self.complain(row, Code.OPEN_BLOCK, text)
         elif word in self.words.ends:
             self._end(word, row, kinds)
 

@@ -11,6 +11,8 @@ from postproc.language.analysis.assigned_points import (
     Component,
     Scope,
 )
+from postproc.language.analysis.symbols import TaskSymbols
+from postproc.language.analysis.values import WrittenNumber
 from postproc.language.visits import Meaning
 from tests.language.krl.test_visits import DATA, job
 from tests.language.rapid.test_visits import L, task
@@ -19,7 +21,7 @@ HERE = Scope(0, "m", "main")
 
 
 def point(name, index=(), row=0):
-    return AssignedPoint((0, "m", "", name), None, HERE.at(row), index)
+    return AssignedPoint((0, "m", "", name), index, WrittenNumber(float(row)))
 
 
 def test_an_element_is_forgotten_alone_or_with_its_array():
@@ -69,3 +71,33 @@ def test_a_point_may_be_shifted_as_often_as_a_loop_runs():
     assert found.visits.target.meaning.tolist() == [Meaning.POSE]
     start = job("LIN XP1").visits.target.values[0]
     np.testing.assert_allclose(found.visits.target.values[0, 2], start[2] + 1000.0)
+
+
+def test_a_point_is_assigned_once_and_each_move_takes_of_it_what_it_can():
+    """Two moves to one point without S and T: on a line, and by joints."""
+    lines = ["DECL POS q", "DECL E6AXIS r", "q=XLIN", "LIN q", "PTP q"]
+    found = job(*lines, "r=XA", "PTP r", "LIN r")
+    v = found.visits
+    told = [v.reasons[k].text for k in v.reason.tolist()]
+    assert told[0] == told[2] == "" and "without S and T" in told[1]
+    assert "the move to it is no PTP" in told[3]
+    meanings = [Meaning.POSE, Meaning.UNKNOWN, Meaning.JOINTS, Meaning.UNKNOWN]
+    assert v.target.meaning.tolist() == meanings
+
+
+def test_functions_within_functions_cost_what_their_depth_does(monkeypatch):
+    calls, real = [], TaskSymbols.value
+
+    def value(self, *given):
+        calls.append(given)
+        return real(self, *given)
+
+    monkeypatch.setattr(TaskSymbols, "value", value)
+    more = "VAR robtarget q;FUNC robtarget f(robtarget a) RETURN Offs(a,0,0,1); ENDFUNC"
+    counts = []
+    for depth in (3, 5, 7):
+        calls.clear()
+        move = f"q:={'f(' * depth}q{')' * depth};"
+        task("q:=p1;", move, L.format("q"), more=more)
+        counts.append(len(calls))
+    assert counts[2] < 5 * counts[1] < 25 * counts[0]

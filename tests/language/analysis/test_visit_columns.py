@@ -25,7 +25,7 @@ ROWS = st.lists(
 def columns_of(slots):
     """Return columns of visits with some numbers, and where these stand."""
     text = read_text(Source("a.src", TEXT), _native.scan_krl, str)
-    numbering = Numbering.of([(text.source, text.numbers)])
+    numbering = Numbering([text])
     columns = VisitColumns(len(slots), WIDTH, 0, len(numbering))
     columns.slots[:] = slots
     return columns, numbering

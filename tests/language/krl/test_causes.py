@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from postproc.exceptions import ProgramError
-from postproc.language.krl.parser import RESERVED
 from postproc.language.krl.symbols import FUNCTIONS, STILL
+from postproc.language.krl.syntax import NAMES
 from postproc.language.visits import ELSEWHERE, ZoneRule
 from tests.language.krl.test_visits import job, origins, reasons
 
@@ -51,7 +51,7 @@ CANNOT = frozenset(
     """.split()
 )
 """Words that neither end a move elsewhere nor change settings by themselves."""
-WORDS = RESERVED | frozenset(
+WORDS = NAMES["reserved"] | frozenset(
     """
     anin anout asycancel asycont asyptp asystop ca channel confirm delay digin distance
     maximum minimum move_emi on_error_proceed path prio public pulse sec rsi_on

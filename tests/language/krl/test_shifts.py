@@ -46,6 +46,14 @@ def test_a_shift_of_a_point_that_is_not_known_keeps_its_numbers(move, point):
     assert reasons(found)[:4] == [""] * 4 and (reasons(found)[5] == "") == known
 
 
+def test_an_element_that_a_joint_move_cannot_go_to_holds_no_other():
+    lines = ["FOR I=1 TO 3", "LIN XS[I]", WORDS["of a joint move"], "ENDFOR"]
+    found = read(*lines, last=POINTS["without S and T"]).visits.literals
+    pins = dict(zip(found.name, found.pinned, strict=True))
+    assert pins["xs[1]"] == pins["xs[2]"] == ""
+    assert pins["xs[3]"] == "xs[3] is shifted without S and T"
+
+
 @pytest.mark.parametrize("move", WORDS.values(), ids=WORDS)
 def test_a_shift_of_an_element_that_only_the_run_tells_keeps_its_numbers(move):
     lines = ["FOR I=1 TO 2", move.replace("[I]", "[1]"), "ENDFOR"]

@@ -101,7 +101,7 @@ def given_as(name, way="in"):
          ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b", "out")))),
         ("deffct real f ( )", ir.RoutineHead("deffct", "f", (), True)),
         ("DEFDAT $CONFIG", said.DataList("$config")),
-        ("DEFDAT m PUBLIC", said.DataList("m", True)),
+        ("DEFDAT m PUBLIC", said.DataList("m")),
         ("END", ir.BlockWord("end")),
         ("ENDSWITCH", ir.BlockWord("endtest")),
         ("DECL GLOBAL CONST INT N=3", ir.Declaration(

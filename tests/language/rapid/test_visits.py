@@ -530,6 +530,23 @@ def heights(found):
     return [v.frame.poses[k][2, 3] if k >= 0 else None for k in v.frame.uframe]
 
 
+@pytest.mark.parametrize("kind", ["CONST", "PERS", "VAR"])
+def test_data_that_are_given_those_of_the_controller(kind):
+    own = (("zonedata z", "z20"), ("speeddata v", "v50"), ("tooldata flange", "tool0"))
+    more = "\n".join(f"{kind} {name}:={value};" for name, value in own)
+    found = once("MoveL p1,v,z,flange;", L.format("p2"), more=more)
+    v = found.visits
+    assert reasons(found) == ["", ""]
+    assert (v.zone.size_mm[0], v.speed.linear[0]) == (20.0, 0.05)
+    np.testing.assert_array_equal(v.frame.poses[v.frame.tool[0]], np.eye(4))
+
+
+def test_data_of_the_program_hide_those_of_the_controller():
+    own = "CONST zonedata z20:=[FALSE,7,15,15,1.5,15,1.5];"
+    v = once("MoveL p1,v50,z20,t;", L.format("p2"), more=own).visits
+    assert v.zone.size_mm.tolist()[0] == 7.0
+
+
 def test_work_objects_and_tools_that_the_program_assigns_are_known():
     up = "wv.oframe.trans.z:=5;"
     found = task(SET, in_wobj("p1"), up, in_wobj("p2"), more=WOBJ)

@@ -1,27 +1,14 @@
-"""What an analysis finds of an arrival, before it becomes columns."""
+"""Where a move goes, as an analysis finds it."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections import defaultdict
-from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
-    AssignedPoint,
-    Points,
-    Scope,
-)
-from postproc.language.analysis.origins import Origins
+from postproc.diagnostics import NO_REASON, Reason
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
-from postproc.robot.trajectory import Motion
-
-MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
 
 
 @dataclass(frozen=True)
@@ -131,49 +118,6 @@ def hold_numbers(
     )  # fmt: skip
 
 
-def spell_element(held: AssignedPoint, brackets: str) -> str:
-    """Spell a point, or an element of an array.
-
-    Args:
-        held: The point.
-        brackets: Those around an index.
-    """
-    index = ",".join(map(str, held.index))
-    return held.name + (index and f"{brackets[0]}{index}{brackets[1]}")
-
-
-def explain_components(
-    held: AssignedPoint, name: str, files: Sequence[Any], known: bool
-) -> Reason:
-    """Say which components of a point are set by themselves, and where.
-
-    Args:
-        held: The point.
-        name: As it is spelt.
-        files: Of the task.
-        known: All of its numbers are known.
-    """
-    late = [one for one in held.components if one.value is None]
-    meant = late or held.components
-    lines = defaultdict[int, set[int]](set)
-    for one in meant:
-        lines[one.file].add(files[one.file].text.line(one.row))
-    places = [
-        f"line{'s' * (len(own) > 1)} {', '.join(map(str, sorted(own)[:MOST_NAMED]))} "
-        f"of {files[at].text.source.name}"
-        for at, own in sorted(lines.items())
-    ]
-    parts = ", ".join(one.name for one in meant[:MOST_PARTS])
-    more = len(meant) - MOST_PARTS
-    parts += f" and {more} more" if more > 0 else ""
-    text = f"{name}: {parts} set in {', '.join(places)}"
-    if late:
-        text = f"{text} to what is known only when the program runs"
-    elif not known:
-        text = f"{text}; its other numbers are known only when the program runs"
-    return Reason(Code.COMPUTED_TARGET if known else Code.RUNTIME_VALUE, text)
-
-
 def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
     """Return the goal of a move that need not reach it: its numbers stay.
 
@@ -185,47 +129,6 @@ def not_reached(goal: FoundGoal, why: Reason) -> FoundGoal:
         Meaning.UNKNOWN, tuple(math.nan for _ in goal.values), follows=(goal.point,),
         name=goal.name, aux=goal.aux, why=why, pins=goal.pins or why.text,
     )  # fmt: skip
-
-
-@dataclass
-class FoundVisit:
-    """One arrival, as it is found.
-
-    Attributes:
-        scope: Where the move stands.
-        motion, via: `Motion`, and whether it is the point of an arc.
-        goal: Where it goes.
-        modes: What holds there.
-        origins: Where it may come from.
-        why: Why it cannot be compensated.
-        arc_angle: As in `Visits` [rad].
-        block: Tells the curves apart that visits are points of, None for none.
-        curved: As in `Visits`.
-        count: How many moves it stands for that follow each other and differ only in
-            where they go: this one is the first.
-        points: What points hold where it was read.
-        left: With what the program went on behind it the last time: modes, points, and
-            where else the arm may come from.
-    """
-
-    scope: Scope
-    motion: Motion
-    via: bool
-    goal: FoundGoal
-    modes: Any
-    origins: Origins = frozenset()
-    why: Reason = NO_REASON
-    arc_angle: float = math.nan
-    block: Hashable = None
-    curved: bool = False
-    count: int = 1
-    points: Points = NO_POINTS
-    left: tuple[Any, Any, Origins] | None = None
-
-    @property
-    def row(self) -> int:
-        """The row of the move in its file."""
-        return self.scope.row
 
 
 def whole_name(name: str) -> str:
