@@ -25,6 +25,7 @@ from postproc.robot.trajectory import Motion
 FINE = 8  # parts of an interval in which a joint changes its flank
 SLOW = 0.2  # of the highest speed of a joint: so fast surveys move, and links rest
 CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
+JUMPS = 2.0 / FINE  # of half the play: more between two is looked at once more
 
 
 @dataclass(frozen=True)
@@ -108,13 +109,17 @@ class AlongWays:
         """Where each joint lies in its play, the middle of what is known, (s, 6)."""
         return (self.least + self.most) / 2
 
-    def changes(self) -> Bools:
-        """Tell behind which samples joints change their flanks, (s, 6)."""
+    def changes(self, least: float) -> Bools:
+        """Tell behind which samples joints change their flanks, (s, 6).
+
+        Args:
+            least: Of half the play: less is no change.
+        """
         moved = np.maximum(
             np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
             np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
         )
-        return np.asarray(moved > CHANGED)
+        return np.asarray(moved > least)
 
 
 def find_fast_stops(cycle: ProgramCycle) -> Bools:
@@ -216,12 +221,34 @@ def refine_at_reversals(
     cycles: tuple[ProgramCycle, ...],
     pair: list[PathSamples],
 ) -> list[PathSamples]:
-    """Look closer where a joint changes its flank, before or after."""
+    """Look closer where a joint changes its flank, before or after.
+
+    Once more where links jump: where a joint is still across its gap within a sample.
+    """
+    changes = _find_changes(cell, model, cycles, pair, CHANGED)
+    changes |= np.append(changes[1:], False) | np.append(False, changes[:-1])
+    pair = _refine(pair, changes)
+    return _refine(pair, _find_changes(cell, model, cycles, pair, JUMPS))
+
+
+def _find_changes(
+    cell: Cell,
+    model: Model,
+    cycles: tuple[ProgramCycle, ...],
+    pair: list[PathSamples],
+    least: float,
+) -> Bools:
+    """Tell behind which samples joints change their flanks, before or after, (s,)."""
     changes = np.zeros(len(pair[0].q), dtype=bool)
     for cycle, ways in zip(cycles, pair, strict=True):
-        own = any_in_rows(AlongWays.of(cell, model, cycle, ways).changes())
-        changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
-    changes &= ~np.append(pair[0].begins[1:], True)
-    after = np.repeat(np.flatnonzero(changes), FINE - 1)
-    share = np.tile(np.arange(1, FINE) / FINE, int(changes.sum()))
+        run = AlongWays.of(cell, model, cycle, ways)
+        changes |= any_in_rows(run.changes(least))
+    return changes
+
+
+def _refine(pair: list[PathSamples], rows: Bools) -> list[PathSamples]:
+    """Cut what follows some samples (s,) of ways into `FINE` parts."""
+    rows &= ~np.append(pair[0].begins[1:], True)
+    after = np.repeat(np.flatnonzero(rows), FINE - 1)
+    share = np.tile(np.arange(1, FINE) / FINE, int(rows.sum()))
     return [ways.refine(after, share) for ways in pair]
