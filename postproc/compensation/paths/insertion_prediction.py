@@ -496,6 +496,11 @@ class PathPrediction:
         paths = self.part_of(v).paths
         return paths, paths.row_of(v)
 
+    def length_of(self, v: int) -> float:
+        """Return the length of the path to a visit [m]."""
+        paths, k = self.path_to(v)
+        return float(paths.way[paths.samples(k)][-1])
+
     @cached_property
     def sizes(self) -> dict[int, float]:
         """Return how far each move leaves its path at the most [m], by visit."""

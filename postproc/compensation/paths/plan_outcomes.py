@@ -268,6 +268,17 @@ class _Difference(NamedTuple):
     by: Floats
 
 
+def _largest_at_begin(far: Floats, way: Floats, first: Ints) -> Floats:
+    """Return the largest distance in the first `BEGINS` of each way, (w,) [m].
+
+    Args:
+        far: Distances from the path at samples, (s,) [m].
+        way: Path length there, (s,) [m].
+        first: Where the samples of each way begin, (w,).
+    """
+    return np.asarray(np.maximum.reduceat(np.where(way < BEGINS, far, 0.0), first))
+
+
 @dataclass(frozen=True)
 class _PlannedMoves:
     """The ways of m moves with one plan, s samples in all.
@@ -406,7 +417,8 @@ class _PlannedMoves:
     ) -> tuple[Floats, Floats]:
         """Return how much farther ways are off than usual, and at which share.
 
-        Where a move begins, what the whole of its way is off usually counts.
+        Where a move begins, the largest usual distance in `BEGINS` counts: links jump
+        as soon as their drives have crossed, with points a little sooner or later.
 
         Args:
             usual: The moves without points.
@@ -425,15 +437,13 @@ class _PlannedMoves:
             beside = usual._beside(old)
             columns = [np.interp(here, there, column) for column in beside.T]
             far, usually = self._err_worst(samples, np.stack(columns, axis=1))
-            most = np.maximum.reduceat(usually, first)
+            most = _largest_at_begin(usually, self.way[samples], first)
         else:
             far, before = self._distances(key)[samples], usual._distances(key)[old]
-            usually, most = (
-                np.interp(here, there, before),
-                np.maximum.reduceat(before, start),
-            )
+            usually = np.interp(here, there, before)
+            most = _largest_at_begin(before, usual.way[old], start)
         begins = (self.way[samples] < BEGINS) & leads[own]
-        usually[begins] = most[own[begins]]
+        usually[begins] = np.maximum(usually, most[own])[begins]
         more = far - usually
         top = largest_in(more, own, first)
         whole = np.maximum(self.way[self.first[ways + 1] - 1], 1e-12)

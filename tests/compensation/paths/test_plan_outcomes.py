@@ -143,13 +143,18 @@ def test_the_deviation_is_that_of_95_percent_of_the_way() -> None:
         assert found.objection(1) is None
 
 
-def test_where_a_move_begins_its_largest_deviation_counts() -> None:
+@pytest.mark.parametrize(
+    ("usual_at", "points_at", "harm"),
+    [(4, 2, False), (2, 3, False), (80, 2, True), (4, 2 + round(BEGINS / MM), True)],
+)
+def test_where_a_move_begins_the_largest_deviation_there_counts(
+    usual_at: int, points_at: int, harm: bool
+) -> None:
     usual = program(0.0)
-    usual.after.across[80] = 0.2 * MM
-    for first, harm in ((2, False), (2 + round(BEGINS / MM), True)):
-        points = program(0.0, case(1, first, first + 2, 0.19, 0.2))
-        found = compare((usual, points), (7,), TOLERANCE).objection(1)
-        assert (found is not None) == harm
+    usual.after.across[usual_at] = 0.2 * MM
+    points = program(0.0, case(1, points_at, points_at + 2, 0.19, 0.2))
+    found = compare((usual, points), (7,), TOLERANCE).objection(1)
+    assert (found is not None) == harm
 
 
 def test_joints_with_small_steps_never_speak_against_a_plan() -> None:
