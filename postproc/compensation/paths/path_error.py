@@ -262,7 +262,7 @@ def predict_paths(
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
     cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
-    pair = _ways(cell, model, cycles, rows, tools)
+    pair = _ways(cell, model, cycles, rows, tools, source is None)
     run = AlongWays.of(cell, model, after, pair[1])
     error = ErrorAlong(cell, model, temperature)
     tools = tools[pair[0].way]
@@ -303,14 +303,18 @@ def _ways(
     cycles: tuple[ProgramCycle, ...],
     rows: Ints,
     tools: Floats,
+    both: bool,
 ) -> list[PathSamples]:
-    """Sample the ways to some visits before and after, at the same places."""
+    """Sample the ways to some visits before and after, at the same places.
+
+    Densely where joints change their flanks after, or in both.
+    """
     pair = [ways_of(cycle, rows) for cycle in cycles]
     if not len(rows):
         return pair
     wanted, commanded = (cell.arm.tcp(w.q, tools[w.way]) for w in pair)
     pair[1] = pair[1].as_many(pair[0], commanded, wanted)
-    return refine_at_reversals(cell, model, cycles, pair)
+    return refine_at_reversals(cell, model, cycles if both else cycles[1:], pair)
 
 
 def _groups(owner: Ints) -> tuple[Ints, Ints]:

@@ -47,8 +47,9 @@ class AlongWays:
 
     @classmethod
     def of(
-        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples
-    ) -> AlongWays:
+        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
+        half: Floats | None = None,
+    ) -> AlongWays:  # fmt: skip
         """Follow the joints' plays along the ways, each as wide as its gap there.
 
         What is known of them where a way begins is what the way before it leaves, where
@@ -59,9 +60,11 @@ class AlongWays:
             model: The arm's error.
             cycle: The program.
             ways: Its ways.
+            half: Half of the joints' gaps there, (s, 6) [rad]; None: by the model.
         """
         width = nominal_widths(flanks_of(model, cell.arm))
-        half = half_widths(model, cell.arm, ways.q)
+        if half is None:
+            half = half_widths(model, cell.arm, ways.q)
         return cls._follow(cell, cycle, ways, half, width)
 
     def over(self, cell: Cell, width: Floats) -> AlongWays:
@@ -221,14 +224,22 @@ def refine_at_reversals(
     cycles: tuple[ProgramCycle, ...],
     pair: list[PathSamples],
 ) -> list[PathSamples]:
-    """Look closer where a joint changes its flank, before or after.
+    """Look closer where a joint changes its flank in one of some programs.
 
     Once more where links jump: where a joint is still across its gap within a sample.
+
+    Args:
+        cell: The arm, its play as wide as its gaps.
+        model: The arm's error.
+        cycles: The programs that count; the last ones of those that `pair` is of.
+        pair: Ways of programs with as many samples each.
     """
-    changes = _find_changes(cell, model, cycles, pair, CHANGED)
+    half = half_widths(model, cell.arm, pair[0].q)  # of all: they differ by corrections
+    changes = _find_changes(cell, model, cycles, pair, half, CHANGED)
     changes |= np.append(changes[1:], False) | np.append(False, changes[:-1])
-    pair = _refine(pair, changes)
-    return _refine(pair, _find_changes(cell, model, cycles, pair, JUMPS))
+    pair, half = _refine(pair, half, changes)
+    jumps = _find_changes(cell, model, cycles, pair, half, JUMPS)
+    return _refine(pair, half, jumps)[0]
 
 
 def _find_changes(
@@ -236,19 +247,26 @@ def _find_changes(
     model: Model,
     cycles: tuple[ProgramCycle, ...],
     pair: list[PathSamples],
+    half: Floats,
     least: float,
 ) -> Bools:
-    """Tell behind which samples joints change their flanks, before or after, (s,)."""
-    changes = np.zeros(len(pair[0].q), dtype=bool)
-    for cycle, ways in zip(cycles, pair, strict=True):
-        run = AlongWays.of(cell, model, cycle, ways)
+    """Tell behind which samples joints change their flanks, (s,)."""
+    changes = np.zeros(len(half), dtype=bool)
+    for cycle, ways in zip(cycles, pair[-len(cycles) :], strict=True):
+        run = AlongWays.of(cell, model, cycle, ways, half)
         changes |= any_in_rows(run.changes(least))
     return changes
 
 
-def _refine(pair: list[PathSamples], rows: Bools) -> list[PathSamples]:
-    """Cut what follows some samples (s,) of ways into `FINE` parts."""
+def _refine(
+    pair: list[PathSamples], half: Floats, rows: Bools
+) -> tuple[list[PathSamples], Floats]:
+    """Cut what follows some samples (s,) of ways into `FINE` parts; gaps go evenly."""
     rows &= ~np.append(pair[0].begins[1:], True)
-    after = np.repeat(np.flatnonzero(rows), FINE - 1)
-    share = np.tile(np.arange(1, FINE) / FINE, int(rows.sum()))
-    return [ways.refine(after, share) for ways in pair]
+    at = np.flatnonzero(rows)
+    after = np.repeat(at, FINE - 1)
+    share = np.tile(np.arange(1, FINE) / FINE, len(at))
+    u = share[:, None]
+    new = (1 - u) * half[after] + u * half[after + 1]
+    finer = np.insert(half, after + 1, new, axis=0)
+    return [ways.refine(after, share) for ways in pair], finer
