@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,7 +25,7 @@ from postproc.robot.trajectory import Motion
 FINE = 8  # parts of an interval in which a joint changes its flank
 SLOW = 0.2  # of the highest speed of a joint: so fast surveys move, and links rest
 CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
-JUMPS = 2.0 / FINE  # of half the play: more between two is looked at once more
+RESTS = 0.999  # of half the play: a link that lies there rests on its flank
 
 
 @dataclass(frozen=True)
@@ -112,17 +112,18 @@ class AlongWays:
         """Where each joint lies in its play, the middle of what is known, (s, 6)."""
         return (self.least + self.most) / 2
 
-    def changes(self, least: float) -> Bools:
-        """Tell behind which samples joints change their flanks, (s, 6).
-
-        Args:
-            least: Of half the play: less is no change.
-        """
+    def changes(self) -> Bools:
+        """Tell behind which samples joints change their flanks, (s, 6)."""
         moved = np.maximum(
             np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
             np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
         )
-        return np.asarray(moved > least)
+        return np.asarray(moved > CHANGED)
+
+    def arrivals(self) -> Bools:
+        """Tell behind which samples joints come to rest on a flank, (s, 6)."""
+        rests = np.abs(self.side) >= RESTS
+        return self.changes() & np.append(rests[1:], rests[-1:], axis=0)
 
 
 def find_fast_stops(cycle: ProgramCycle) -> Bools:
@@ -226,7 +227,8 @@ def refine_at_reversals(
 ) -> list[PathSamples]:
     """Look closer where a joint changes its flank in one of some programs.
 
-    Once more where links jump: where a joint is still across its gap within a sample.
+    Once more where it comes to rest: the largest deviation stands there, however fast
+    its drive crosses the gap.
 
     Args:
         cell: The arm, its play as wide as its gaps.
@@ -235,27 +237,27 @@ def refine_at_reversals(
         pair: Ways of programs with as many samples each.
     """
     half = half_widths(model, cell.arm, pair[0].q)  # of all: they differ by corrections
-    changes = _find_changes(cell, model, cycles, pair, half, CHANGED)
+    changes = _find(AlongWays.changes, cell, model, cycles, pair, half)
     changes |= np.append(changes[1:], False) | np.append(False, changes[:-1])
     pair, half = _refine(pair, half, changes)
-    jumps = _find_changes(cell, model, cycles, pair, half, JUMPS)
-    return _refine(pair, half, jumps)[0]
+    arrivals = _find(AlongWays.arrivals, cell, model, cycles, pair, half)
+    return _refine(pair, half, arrivals)[0]
 
 
-def _find_changes(
+def _find(
+    what: Callable[[AlongWays], Bools],
     cell: Cell,
     model: Model,
     cycles: tuple[ProgramCycle, ...],
     pair: list[PathSamples],
     half: Floats,
-    least: float,
 ) -> Bools:
-    """Tell behind which samples joints change their flanks, (s,)."""
-    changes = np.zeros(len(half), dtype=bool)
+    """Tell behind which samples something is so for any joint of the programs, (s,)."""
+    found = np.zeros(len(half), dtype=bool)
     for cycle, ways in zip(cycles, pair[-len(cycles) :], strict=True):
         run = AlongWays.of(cell, model, cycle, ways, half)
-        changes |= any_in_rows(run.changes(least))
-    return changes
+        found |= any_in_rows(what(run))
+    return found
 
 
 def _refine(
