@@ -8,13 +8,14 @@ all joints, and leaves some of them within their play.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints, spans
 from postproc.compensation.options import Job
-from postproc.compensation.paths.path_error import sides_on_move
+from postproc.compensation.paths.path_error import sides_on_moves
 from postproc.language.visits import OrientationLaw, Visits
 from postproc.model.backlash_width import half_widths
 from postproc.model.flank_hypotheses import flanks_of, nominal_widths
@@ -77,28 +78,37 @@ def cross_at_once(side: Floats, first: Ints) -> Floats:
 
 
 def take_up(
-    cycle: ProgramCycle, setting: Job, visits: Visits, v: int
-) -> BacklashPreload:
-    """Say how play is taken up where a move begins.
+    cycle: ProgramCycle, setting: Job, visits: Visits, moves: Collection[int]
+) -> dict[int, BacklashPreload]:
+    """Say how play is taken up where some moves begin.
 
     Args:
         cycle: The program without such stops, compensated.
         setting: What it is compensated with.
         visits: The program.
-        v: The visit at the end of the move.
+        moves: The visits at their ends.
     """
-    cell = setting.cell
-    way, sides = sides_on_move(cycle, cell, setting.model, v)
-    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
-    came, leaves = sides[0], cross_at_once(sides, np.array([0, len(way)]))[at]
+    if not moves:
+        return {}
+    cell, model = setting.cell, setting.model
+    own = np.array(sorted(moves, reverse=True))  # so that none follows the one before
+    way, sides, first = sides_on_moves(cycle, cell, model, own)
+    begins, last = first[:-1], first[1:] - 1
+    far = np.append(0, np.cumsum(way < LEAVING))
+    at = np.minimum(begins + far[first[1:]] - far[begins], last)
+    came, leaves = sides[begins], cross_at_once(sides, first)[at]
     crosses = (np.abs(leaves - came) > CROSSES) & (np.abs(leaves) > WHOLE)
-    crosses &= nominal_widths(flanks_of(setting.model, cell.arm)) == 1.0
-    crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
+    crosses &= nominal_widths(flanks_of(model, cell.arm)) == 1.0
     side = np.where(crosses, np.sign(leaves), came)
-    q = cycle.path.q[int(cycle.ways[1][v])]
-    tool = cycle.targets.tool[v, :3, :3]
-    turn = find_drive_turns(setting, visits, v, tool, q[None], (side - came)[None])
-    return BacklashPreload(side, turn[0], crossing)
+    q = cycle.path.q[cycle.ways[1][own]]
+    tool = cycle.targets.tool[own, :3, :3]
+    turn = find_drive_turns(setting, visits, own, tool, q, side - came)
+    return {
+        v: BacklashPreload(
+            side[k], turn[k], tuple((np.flatnonzero(crosses[k]) + 1).tolist())
+        )
+        for k, v in enumerate(own.tolist())
+    }
 
 
 def find_drive_turns(

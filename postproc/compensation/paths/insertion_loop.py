@@ -198,6 +198,8 @@ def _put_on_path(
         plan, stop = _find_stop(now, plan, v)
         if stop is not None:
             rest = known[v in plan.stops :]
+            if stop == 0.0:
+                return replace(plan, stops=plan.stops - {v}).put(v, rest)
             return replace(plan, stops=plan.stops | {v}).put(v, (stop, *rest))
     wanted = _on_path(now, v)
     new = wanted[: max(room, 0)]
@@ -211,22 +213,25 @@ def _find_stop(
 ) -> tuple[InsertionPlan, float | None]:
     """Find where the arm stops to take up play before a path, as a share of it.
 
-    How near does best is tried out. None where nothing is left to try.
+    How near does best is tried out, and whether any stop does: none is one at 0. None
+    where nothing is left to try.
     """
     paths, k = now.path_to(v)
     samples = paths.samples(k)
     begin, length = paths.way[samples] < plan.open[v][0], float(paths.way[samples][-1])
     places = [there / length for there in TAKEN if there < LATEST * length]
     off = float(paths.after.across[samples][begin].max(initial=0.0))
-    tried = plan.tried.get(v, ())
-    if v in plan.stops and len(tried) < len(places):
-        tried = (*tried, (off, plan.points[v][0]))
-    stop = None
-    if off > now.task.aim and len(tried) <= len(places) and places:
-        stop = places[len(tried)] if len(tried) < len(places) else min(tried)[1]
-        if len(tried) == len(places):
+    tried, here = plan.tried.get(v, ()), 0.0
+    if v in plan.stops:
+        here = plan.points[v][0]
+    if not tried or (v in plan.stops and len(tried) <= len(places)):
+        tried = (*tried, (off, here))
+    stop, number = None, len(tried) - 1
+    if off > now.task.aim and number <= len(places) and places:
+        stop = places[number] if number < len(places) else min(tried)[1]
+        if number == len(places):
             tried = (*tried, (0.0, stop))  # it is settled
-            stop = stop if stop != plan.points[v][0] else None
+            stop = stop if stop != here else None
     return replace(plan, tried={**plan.tried, v: tried}), stop
 
 

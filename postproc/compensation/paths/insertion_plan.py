@@ -28,7 +28,7 @@ class InsertionPlan:
         halved: Moves whose points correct half of what flanks change by.
         chords: Pieces of arcs that are chords whatever they bend.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
-        tried: How far a move with a stop began off, and where it stopped, try by try.
+        tried: How far a move began off, and where it stopped, try by try; 0: nowhere.
         shut: Where no points may lie any more: corrections changed too fast there.
         settled: Moves that more points do not help.
         crowded: More points were wanted than there was room for.
@@ -121,12 +121,10 @@ class InsertionPlan:
             plan = plan.drop(v, {plan.points[v][0]})
         return plan
 
-    def move_stops(self, places: Mapping[int, float]) -> InsertionPlan:
-        """Put the stops of lines elsewhere, at shares of their ways."""
-        plan = self
-        for v, share in places.items():
-            plan = plan.put(v, (share, *self.points[v][1:]))
-        return plan
+    def put_all(self, points: Mapping[int, Collection[float]]) -> InsertionPlan:
+        """Put other points on the ways of some lines, see `put`."""
+        other = {v: tuple(sorted(map(float, own))) for v, own in points.items()}
+        return replace(self, points={**self.points, **other})
 
     def as_in(self, other: InsertionPlan, v: int) -> InsertionPlan:
         """Put on the way of a move what another plan puts there."""

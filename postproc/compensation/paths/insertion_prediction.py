@@ -61,6 +61,7 @@ from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint, flanks_of
 from postproc.robot.pose import MM, lengths
 
 AIM = 0.4  # of the tolerance: what points are to reach
+AT_ONCE = 600  # windows that are predicted: arrays of more leave the processor's cache
 KEPT = 4  # predictions that are kept: plans return to what was tried
 
 Write = Callable[[ParsedProgram, WindowResult, Job], tuple[Output, ParsedProgram]]
@@ -208,9 +209,11 @@ class InsertionTask:
     def _know(
         self, plan: InsertionPlan, keys: Mapping[int, Key], some: Sequence[int]
     ) -> bool:
-        """Predict those of some windows that are new; see `_predict_windows`."""
-        new = [k for k in some if (k, keys[k]) not in self._parts]
-        return not new or self._predict_windows(plan, keys, new)
+        """Predict those of some windows that are new, see `_predict_windows`."""
+        while new := [k for k in some if (k, keys[k]) not in self._parts]:
+            if not self._predict_windows(plan, keys, new[:AT_ONCE]):
+                return False
+        return True
 
     def _predict_all(
         self, plan: InsertionPlan, keys: Mapping[int, Key]
@@ -495,6 +498,11 @@ class PathPrediction:
         """Return paths among which is that to a visit, and which it is."""
         paths = self.part_of(v).paths
         return paths, paths.row_of(v)
+
+    def length_of(self, v: int) -> float:
+        """Return the length of the path to a visit [m]."""
+        paths, k = self.path_to(v)
+        return float(paths.way[paths.samples(k)][-1])
 
     @cached_property
     def sizes(self) -> dict[int, float]:

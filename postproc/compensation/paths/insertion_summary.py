@@ -16,7 +16,13 @@ from postproc.compensation.paths.insertion_prediction import (
 )
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import sizes_of
-from postproc.compensation.paths.plan_outcomes import BEGINS, MoveOutcomes, compare
+from postproc.compensation.paths.plan_outcomes import (
+    BEGINS,
+    MoveOutcomes,
+    Rows,
+    compare,
+    find_largest,
+)
 from postproc.compensation.paths.reapproach import find_reapproaches
 from postproc.compensation.paths.split_selection import can_stop
 from postproc.compensation.pipeline import CompensatedProgram
@@ -53,6 +59,9 @@ def _report_insertions(now: PathPrediction) -> Insertions:
     """Say what was put on ways, and why moves that are left too far got nothing."""
     task, plan, visits = now.task, now.plan, now.task.visits
     outcomes = _outcomes(now)
+    promises = {v: one.choice[1] for rows, one in outcomes.items() for v in rows}
+    farthest = find_largest(now.predicted, outcomes)
+    largest = {v: far for rows, far in farthest.items() for v in rows}
     why = "its pieces would be too short, or the path no better"
     if plan.crowded:
         why = "no more points may be inserted (max_inserted)"
@@ -69,13 +78,13 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.stops & plan.points.keys(),
         left,
         sizes_of(task.first.paths),
-        {v: one.choice[1] for v, one in outcomes.items()},
+        promises,
         find_reapproaches(now),
         plan.unconfirmed,
         _cures(now),
         _cell_speed(now),
         _limit_speed(now),
-        {v: one.worst for v, one in outcomes.items()},
+        largest,
         _fast_stops(now.task),
     )
 
@@ -126,8 +135,7 @@ def _cures(now: PathPrediction) -> dict[int, str]:
     return found
 
 
-def _outcomes(now: PathPrediction) -> dict[int, MoveOutcomes]:
-    """Return how moves do with their points by all open hypotheses, by visit."""
+def _outcomes(now: PathPrediction) -> dict[Rows, MoveOutcomes]:
+    """Return how moves do with their points by all open hypotheses."""
     moves = sorted({halves(now.task.visits, v) for v in now.sizes})
-    found = compare([now.predicted], moves, now.task.tolerance)
-    return {v: one for rows, one in found.items() for v in rows}
+    return compare([now.predicted], moves, now.task.tolerance)

@@ -262,7 +262,7 @@ def predict_paths(
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
     cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
-    pair = _ways(cell, model, cycles, rows, tools)
+    pair = _ways(cell, model, cycles, rows, tools, source is None)
     run = AlongWays.of(cell, model, after, pair[1])
     error = ErrorAlong(cell, model, temperature)
     tools = tools[pair[0].way]
@@ -303,14 +303,18 @@ def _ways(
     cycles: tuple[ProgramCycle, ...],
     rows: Ints,
     tools: Floats,
+    both: bool,
 ) -> list[PathSamples]:
-    """Sample the ways to some visits before and after, at the same places."""
+    """Sample the ways to some visits before and after, at the same places.
+
+    Densely where joints change their flanks after, or in both.
+    """
     pair = [ways_of(cycle, rows) for cycle in cycles]
     if not len(rows):
         return pair
     wanted, commanded = (cell.arm.tcp(w.q, tools[w.way]) for w in pair)
     pair[1] = pair[1].as_many(pair[0], commanded, wanted)
-    return refine_at_reversals(cell, model, cycles, pair)
+    return refine_at_reversals(cell, model, cycles if both else cycles[1:], pair)
 
 
 def _groups(owner: Ints) -> tuple[Ints, Ints]:
@@ -395,25 +399,27 @@ def _shares(run: AlongWays, error: ErrorAlong, rows: Ints, way: Floats) -> Float
     return size
 
 
-def sides_on_move(
-    cycle: ProgramCycle, cell: Cell, model: Model, v: int
-) -> tuple[Floats, Floats]:
-    """Tell where each joint lies in its play along a move.
+def sides_on_moves(
+    cycle: ProgramCycle, cell: Cell, model: Model, visits: Ints
+) -> tuple[Floats, Floats, Ints]:
+    """Tell where each joint lies in its play along some moves, s samples in all.
 
     Args:
         cycle: The program.
         cell: The arm, its play as wide as its gaps.
         model: The arm's error.
-        v: The visit at the end of the move.
+        visits: Those at the ends of m moves. What is known where each begins is what
+            the program knows there, but where one follows the other here as well.
 
     Returns:
-        The way up to k samples, (k,) [m], and the sides there, (k, 6).
+        The way since each move began, (s,) [m], the sides there, (s, 6), and which
+        samples are those of move k: first[k] .. first[k + 1] - 1, (m + 1,).
     """
-    ways = ways_of(cycle, np.array([v]))
+    ways = ways_of(cycle, visits)
     run = AlongWays.of(cell, model, cycle, ways)
-    tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
+    tool = cycle.targets.tool[visits, :3, 3][ways.way]
     way, _ = measure_along(cell.arm.tcp(ways.q, tool), ways)
-    return way, run.side
+    return way, run.side, ways.first
 
 
 # The ways of a program as the arm should go them: to compare with what was measured.

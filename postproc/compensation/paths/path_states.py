@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,6 +25,7 @@ from postproc.robot.trajectory import Motion
 FINE = 8  # parts of an interval in which a joint changes its flank
 SLOW = 0.2  # of the highest speed of a joint: so fast surveys move, and links rest
 CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
+RESTS = 0.999  # of half the play: a link that lies there rests on its flank
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,9 @@ class AlongWays:
 
     @classmethod
     def of(
-        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples
-    ) -> AlongWays:
+        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
+        half: Floats | None = None,
+    ) -> AlongWays:  # fmt: skip
         """Follow the joints' plays along the ways, each as wide as its gap there.
 
         What is known of them where a way begins is what the way before it leaves, where
@@ -58,9 +60,11 @@ class AlongWays:
             model: The arm's error.
             cycle: The program.
             ways: Its ways.
+            half: Half of the joints' gaps there, (s, 6) [rad]; None: by the model.
         """
         width = nominal_widths(flanks_of(model, cell.arm))
-        half = half_widths(model, cell.arm, ways.q)
+        if half is None:
+            half = half_widths(model, cell.arm, ways.q)
         return cls._follow(cell, cycle, ways, half, width)
 
     def over(self, cell: Cell, width: Floats) -> AlongWays:
@@ -115,6 +119,11 @@ class AlongWays:
             np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
         )
         return np.asarray(moved > CHANGED)
+
+    def arrivals(self) -> Bools:
+        """Tell behind which samples joints come to rest on a flank, (s, 6)."""
+        rests = np.abs(self.side) >= RESTS
+        return self.changes() & np.append(rests[1:], rests[-1:], axis=0)
 
 
 def find_fast_stops(cycle: ProgramCycle) -> Bools:
@@ -216,12 +225,50 @@ def refine_at_reversals(
     cycles: tuple[ProgramCycle, ...],
     pair: list[PathSamples],
 ) -> list[PathSamples]:
-    """Look closer where a joint changes its flank, before or after."""
-    changes = np.zeros(len(pair[0].q), dtype=bool)
-    for cycle, ways in zip(cycles, pair, strict=True):
-        own = any_in_rows(AlongWays.of(cell, model, cycle, ways).changes())
-        changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
-    changes &= ~np.append(pair[0].begins[1:], True)
-    after = np.repeat(np.flatnonzero(changes), FINE - 1)
-    share = np.tile(np.arange(1, FINE) / FINE, int(changes.sum()))
-    return [ways.refine(after, share) for ways in pair]
+    """Look closer where a joint changes its flank in one of some programs.
+
+    Once more where it comes to rest: the largest deviation stands there, however fast
+    its drive crosses the gap.
+
+    Args:
+        cell: The arm, its play as wide as its gaps.
+        model: The arm's error.
+        cycles: The programs that count; the last ones of those that `pair` is of.
+        pair: Ways of programs with as many samples each.
+    """
+    half = half_widths(model, cell.arm, pair[0].q)  # of all: they differ by corrections
+    changes = _find(AlongWays.changes, cell, model, cycles, pair, half)
+    changes |= np.append(changes[1:], False) | np.append(False, changes[:-1])
+    pair, half = _refine(pair, half, changes)
+    arrivals = _find(AlongWays.arrivals, cell, model, cycles, pair, half)
+    return _refine(pair, half, arrivals)[0]
+
+
+def _find(
+    what: Callable[[AlongWays], Bools],
+    cell: Cell,
+    model: Model,
+    cycles: tuple[ProgramCycle, ...],
+    pair: list[PathSamples],
+    half: Floats,
+) -> Bools:
+    """Tell behind which samples something is so for any joint of the programs, (s,)."""
+    found = np.zeros(len(half), dtype=bool)
+    for cycle, ways in zip(cycles, pair[-len(cycles) :], strict=True):
+        run = AlongWays.of(cell, model, cycle, ways, half)
+        found |= any_in_rows(what(run))
+    return found
+
+
+def _refine(
+    pair: list[PathSamples], half: Floats, rows: Bools
+) -> tuple[list[PathSamples], Floats]:
+    """Cut what follows some samples (s,) of ways into `FINE` parts; gaps go evenly."""
+    rows &= ~np.append(pair[0].begins[1:], True)
+    at = np.flatnonzero(rows)
+    after = np.repeat(at, FINE - 1)
+    share = np.tile(np.arange(1, FINE) / FINE, len(at))
+    u = share[:, None]
+    new = (1 - u) * half[after] + u * half[after + 1]
+    finer = np.insert(half, after + 1, new, axis=0)
+    return [ways.refine(after, share) for ways in pair], finer

@@ -12,7 +12,7 @@ import numpy as np
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.expected_error import SIDED
-from postproc.compensation.paths.flank_cases import Key
+from postproc.compensation.paths.flank_cases import OF_ALL, Key
 from postproc.compensation.paths.path_error import (
     PathAccuracy,
     apart,
@@ -104,7 +104,6 @@ class MoveOutcomes:
         keys: The hypotheses behind the first one, that all joints do as predicted.
         weight: (h,).
         tolerance: Of paths [m].
-        largest: How far the last plan leaves the path at the most, (h,) [m].
         choice: The plan that is chosen, see `choose_plan`, and its promise [m].
     """
 
@@ -113,13 +112,13 @@ class MoveOutcomes:
     keys: tuple[Key, ...]
     weight: Floats
     tolerance: float
-    largest: Floats
     choice: tuple[int, float]
 
     @property
-    def worst(self) -> float:
-        """Return how far the last plan leaves the path by any open hypothesis [m]."""
-        return float(self.largest[self.weight > OPEN].max())
+    def open_keys(self) -> list[Key | None]:
+        """Return the open hypotheses; None: all joints do as predicted."""
+        open_ = (self.weight > OPEN).tolist()
+        return [k for k, own in zip((None, *self.keys), open_, strict=True) if own]
 
     def would_choose(self, off: Floats) -> bool:
         """Return True if one more plan were chosen that harms none, (h,) [m]."""
@@ -180,7 +179,6 @@ def compare(
     if (errs := reach >= NEGLIGIBLE * tolerance).any():
         keys, there = [*keys, UNDESCRIBED], np.column_stack([there, errs])
     off, worse, share = np.zeros((3, len(plans), *there.shape))
-    largest = np.zeros(there.shape)
     for k, hypothesis in enumerate([None, *keys]):
         rows = np.flatnonzero(there[:, k])
         for p, ways in enumerate(found if len(rows) else ()):
@@ -188,7 +186,6 @@ def compare(
             if p:
                 harm = ways.measure_harm(found[0], hypothesis, rows)
                 worse[p, rows, k], share[p, rows, k] = harm
-        largest[rows, k] = found[-1].measure_largest(hypothesis, rows)
     weight = _weigh(found, keys, there)
     best, promise = choose_plans(off, worse, np.where(there, weight, 0.0), tolerance)
     choices = [*zip(best.tolist(), promise.tolist(), strict=True)]
@@ -199,10 +196,31 @@ def compare(
             tuple(key for key, is_own in zip(keys, own[1:], strict=True) if is_own),
             weight[m, own],
             tolerance,
-            largest[m, own],
             choices[m],
         )
         for m, (rows, own) in enumerate(zip(moves, there, strict=True))
+    }
+
+
+def find_largest(
+    plan: Predicted, compared: Mapping[Rows, MoveOutcomes]
+) -> dict[Rows, float]:
+    """Return how far moves leave their paths at the most by any open hypothesis [m].
+
+    Of what has one cause in all joints, any of them may do it and the others not.
+
+    Args:
+        plan: The program.
+        compared: What is open of its moves.
+    """
+    if not compared:
+        return {}
+    ways, every = _PlannedMoves.of(plan, [*compared]), np.arange(len(compared))
+    keys = {key for one in compared.values() for key in one.open_keys}
+    largest = {key: ways.measure_largest(key, every) for key in keys}
+    return {
+        rows: max(float(largest[key][m]) for key in one.open_keys)
+        for m, (rows, one) in enumerate(compared.items())
     }
 
 
@@ -266,6 +284,17 @@ class _Difference(NamedTuple):
     rows: Ints
     across: Floats
     by: Floats
+
+
+def _largest_at_begin(far: Floats, way: Floats, first: Ints) -> Floats:
+    """Return the largest distance in the first `BEGINS` of each way, (w,) [m].
+
+    Args:
+        far: Distances from the path at samples, (s,) [m].
+        way: Path length there, (s,) [m].
+        first: Where the samples of each way begin, (w,).
+    """
+    return np.asarray(np.maximum.reduceat(np.where(way < BEGINS, far, 0.0), first))
 
 
 @dataclass(frozen=True)
@@ -406,7 +435,8 @@ class _PlannedMoves:
     ) -> tuple[Floats, Floats]:
         """Return how much farther ways are off than usual, and at which share.
 
-        Where a move begins, what the whole of its way is off usually counts.
+        Where a move begins, the largest usual distance in `BEGINS` counts: links jump
+        as soon as their drives have crossed, with points a little sooner or later.
 
         Args:
             usual: The moves without points.
@@ -425,15 +455,13 @@ class _PlannedMoves:
             beside = usual._beside(old)
             columns = [np.interp(here, there, column) for column in beside.T]
             far, usually = self._err_worst(samples, np.stack(columns, axis=1))
-            most = np.maximum.reduceat(usually, first)
+            most = _largest_at_begin(usually, self.way[samples], first)
         else:
             far, before = self._distances(key)[samples], usual._distances(key)[old]
-            usually, most = (
-                np.interp(here, there, before),
-                np.maximum.reduceat(before, start),
-            )
+            usually = np.interp(here, there, before)
+            most = _largest_at_begin(before, usual.way[old], start)
         begins = (self.way[samples] < BEGINS) & leads[own]
-        usually[begins] = most[own[begins]]
+        usually[begins] = np.maximum(usually, most[own])[begins]
         more = far - usually
         top = largest_in(more, own, first)
         whole = np.maximum(self.way[self.first[ways + 1] - 1], 1e-12)
@@ -466,8 +494,31 @@ class _PlannedMoves:
 
     def measure_largest(self, key: Key | None, moves: Ints) -> Floats:
         """Return the largest distance of some moves from their paths, (k,) [m]."""
-        largest = np.maximum.reduceat(self._distances(key), self._ends[:-1])
+        far = self._distances(key)
+        if key is not None and key[2] == OF_ALL:
+            far = self._farthest_of_any(key[1])
+        largest = np.maximum.reduceat(far, self._ends[:-1])
         return np.asarray(largest[moves])
+
+    def _farthest_of_any(self, kind: FlankKind) -> Floats:
+        """Return the largest distance if any of some joints do what may be, (s,) [m].
+
+        All sets of these joints are tried, each by one joint more or less than the one
+        before (Gray code).
+        """
+        some = [case for (_, own, number), case in self.cases.items()
+                if own is kind and number != OF_ALL]  # fmt: skip
+        rows = np.unique(np.concatenate([case.rows for case in some]))
+        by = np.zeros((len(some), len(rows), 3))
+        for j, case in enumerate(some):
+            by[j, np.searchsorted(rows, case.rows)] = case.by
+        out, off, tangent = np.array(self.across), self.off[rows], self.tangent[rows]
+        for number in range(1, 1 << len(some)):
+            joint = (number & -number).bit_length() - 1
+            adds = (number ^ number >> 1) >> joint & 1
+            off += by[joint] if adds else -by[joint]
+            out[rows] = np.maximum(out[rows], apart(off, tangent)[0])
+        return out
 
     def _samples_of(self, ways: Ints) -> tuple[Ints, Ints, Ints]:
         """Return the samples of ways, whose each is, and where those of each begin."""

@@ -14,6 +14,7 @@ from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import (
+    BEGINS,
     MoveOutcomes,
     Objection,
     Rows,
@@ -77,7 +78,8 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
     """Choose for every move with points how much of them it gets.
 
     See `choose_plan`: all points, those without the stop that preloads or with a later
-    one, points that correct half of what flanks change by, or none. What a hypothesis
+    one, those with a later first point, points that correct half of what flanks change
+    by, or none. What a hypothesis
     speaks against is thinned out later.
     """
     visits, chosen = now.task.visits, now.plan
@@ -98,7 +100,8 @@ def _try_plans(
 ) -> Iterator[tuple[Rows, MoveOutcomes, list[InsertionPlan]]]:
     """Yield every move with points, how it does without and by some plans, and these.
 
-    A later stop is looked at where something speaks against points with an early one.
+    A later stop is looked at where something speaks against points with an early one,
+    and a later first point where something speaks against one where the move begins.
     Half is looked at where nothing else keeps the finest promise, and it is expected to
     do better.
     """
@@ -107,7 +110,10 @@ def _try_plans(
         made.append(task.predict(now.plan.without_stops()))
     plain, moves = made[-1], task.compare(made, _moves_with_points(now))
     if later := _stop_later(now, moves):
-        made.append(task.predict(now.plan.move_stops(later)))
+        made.append(task.predict(now.plan.put_all(later)))
+        moves |= task.compare(made, [(v,) for v in later])
+    if later := _begin_later(plain, moves, 1 + made.index(plain)):
+        made.append(task.predict(plain.plan.put_all(later)))
         moves |= task.compare(made, [(v,) for v in later])
     finest, halved = resolution(task.tolerance), dict[Rows, MoveOutcomes]()
     if any(flank.open_kinds for flank in task.flanks):
@@ -123,20 +129,44 @@ def _try_plans(
 
 def _stop_later(
     now: PathPrediction, moves: Mapping[Rows, MoveOutcomes]
-) -> dict[int, float]:
-    """Find lines for which the last place of a stop may do, as shares of their ways.
+) -> dict[int, tuple[float, ...]]:
+    """Find lines for which the last place of a stop may do, and all their points.
 
     Where links ran on, drives that leave on have crossed more of their gaps there.
     """
-    found = dict[int, float]()
+    found = dict[int, tuple[float, ...]]()
     for (v, *rest), compared in moves.items():
         if v in now.plan.stops and not rest and compared.objection(1):
-            paths, k = now.path_to(v)
-            share = TAKEN[-1] / float(paths.way[paths.samples(k)][-1])
-            room = min((*now.plan.points[v][1:], LATEST))
-            if now.plan.points[v][0] < share < room:
-                found[v] = share
+            share = TAKEN[-1] / now.length_of(v)
+            stop, *points = now.plan.points[v]
+            if stop < share < min((*points, LATEST)):
+                found[v] = (share, *points)
     return found
+
+
+def _begin_later(
+    now: PathPrediction, moves: Mapping[Rows, MoveOutcomes], plan: int
+) -> dict[int, tuple[float, ...]]:
+    """Find lines for which a later first point may do, and all their points.
+
+    Something speaks against what is put where they begin: a link that gives way over
+    several gaps lies between its flanks there.
+
+    Args:
+        now: The program without stops that preload.
+        moves: How its moves do.
+        plan: Which of the compared plans that is.
+    """
+    found = dict[int, tuple[float, ...]]()
+    for (v, *rest), compared in moves.items():
+        objection = compared.objection(plan)
+        if rest or objection is None or v not in now.plan.points:
+            continue
+        length, points = now.length_of(v), now.plan.points[v]
+        if max(objection.place, points[0]) * length < BEGINS:
+            behind = (BEGINS + now.plan.open[v][0]) / length
+            found[v] = (BEGINS / length, *(s for s in points if s > behind))
+    return {v: points for v, points in found.items() if points[0] < LATEST}
 
 
 def _moves_with_points(now: PathPrediction) -> list[Rows]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.backlash_preload import BacklashPreload, take_up
 from postproc.compensation.paths.insertion_plan import InsertionPlan
@@ -30,7 +31,7 @@ def find_split(now: PathPrediction) -> InsertionPlan:
     shortest = task.setting.cell.limits.segment_ms / 1e3
     pieces = shortest_pieces(task.visits, task.first.before, shortest, task.speeds)
     far = _list_far(now)
-    open_, stops = dict(plan.open), dict[int, BacklashPreload | None]()
+    open_, begins = dict(plan.open), list[int]()
     for v in sorted({half for row in far for half in halves(task.visits, row)}):
         if told := _explain_refusal(now, v):
             if v in far:
@@ -39,15 +40,16 @@ def find_split(now: PathPrediction) -> InsertionPlan:
             continue
         open_[v] = pieces[v]
         if task.setting.options.preload_backlash and can_stop(task, v):
-            taken = take_up(task.first.after, task.setting, task.visits, v)
-            if taken.crossing:
-                fits = _is_within_lag(task, v, taken.crossing)
-                stops[v] = taken if fits else None
+            begins.append(v)
+    stops = take_up(task.first.after, task.setting, task.visits, begins)
+    lacks = _find_lacks(task, begins)
+    stops = {v: stop for v, stop in stops.items() if stop.crossing}
+    fits = {v for v, stop in stops.items() if _is_within_lag(task, lacks[v], stop)}
     return replace(
         plan,
         open=open_,
-        idle={v: taken for v, taken in stops.items() if taken is not None},
-        unconfirmed=frozenset(v for v, taken in stops.items() if taken is None),
+        idle={v: stops[v] for v in sorted(fits)},
+        unconfirmed=frozenset(stops.keys() - fits),
     )
 
 
@@ -84,19 +86,29 @@ def can_stop(task: InsertionTask, v: int) -> bool:
     return task.splitter.stops(int(visits.place.file[v]), int(task.lines[v]))
 
 
-def _is_within_lag(task: InsertionTask, v: int, joints: Sequence[int]) -> bool:
+def _is_within_lag(task: InsertionTask, lacks: Floats, stop: BacklashPreload) -> bool:
     """Return True if no open hypothesis makes a stop that crosses gaps matter.
 
-    What a link lacks of its step behind a sharp gap's way, it is off by at the stop.
+    Args:
+        task: The program.
+        lacks: What each link may lack of its step there, (6,) [m].
+        stop: The stop.
     """
-    lacks = (task.flanks[joint - 1].max_lag * _step(task, v, joint) for joint in joints)
-    return sum(lacks) <= resolution(task.tolerance)
+    most = float(sum(lacks[joint - 1] for joint in stop.crossing))
+    return most <= resolution(task.tolerance)
 
 
-def _step(task: InsertionTask, v: int, joint: int) -> float:
-    """Return how far a joint's change of its flank moves the TCP at a visit [m]."""
-    cycle, arm = task.first.after, task.setting.cell.arm
-    tool = cycle.targets.tool[v, :3, 3]
-    by_joint = arm.jacobian(cycle.path.q[v][None], tool)[0, :3, joint - 1]
-    gap = 2.0 * task.setting.gap[joint - 1]
-    return float(np.linalg.norm(by_joint) * gap)
+def _find_lacks(task: InsertionTask, moves: Sequence[int]) -> dict[int, Floats]:
+    """Return what links lack of their steps behind a sharp gap's way, (6,) [m] each.
+
+    By any open hypothesis. The tool is off by it at a stop where drives have crossed.
+    """
+    if not moves:
+        return {}
+    cycle, arm, gap = task.first.after, task.setting.cell.arm, task.setting.gap
+    own = np.array(moves)
+    tool = cycle.targets.tool[own, :3, 3]
+    by_joint = arm.jacobian(cycle.path.q[own], tool)[:, :3]
+    lags = np.array([flank.max_lag for flank in task.flanks])
+    lacks = lags * (np.linalg.norm(by_joint, axis=1) * (2.0 * gap))
+    return dict(zip(moves, lacks, strict=True))

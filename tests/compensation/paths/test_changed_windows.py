@@ -9,7 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.paths import changed_windows, insertion_loop
+from postproc.compensation.paths import (
+    changed_windows,
+    insertion_loop,
+    insertion_prediction,
+)
 from postproc.compensation.paths.changed_windows import Windows, _find_run_ups
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
@@ -29,7 +33,7 @@ HIT = 5e-3  # [mm] as near as rounded points are hit, by the rounds that others 
 
 @pytest.fixture
 def in_windows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Predict in windows whatever changes; count what is."""
+    """Predict in windows whatever changes, two at once; count what is."""
     counted: list[int] = []
     taken = changed_windows.take_windows
 
@@ -40,6 +44,7 @@ def in_windows(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     name = "postproc.compensation.paths.insertion_prediction.take_windows"
     monkeypatch.setattr(name, count)
     monkeypatch.setattr(changed_windows, "MOST", 1.0)
+    monkeypatch.setattr(insertion_prediction, "AT_ONCE", 2)
     return counted
 
 

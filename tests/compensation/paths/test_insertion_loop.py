@@ -461,6 +461,31 @@ def test_points_on_both_flanks_are_sought_at_once() -> None:
     assert insertion_loop._seek_on_path(now, 7) == found[:1]
 
 
+@pytest.mark.parametrize(
+    ("begins_off", "stays"),
+    [({0: 0.3, 1: 0.06, 2: 0.05, 3: 0.07}, 2), ({0: 0.06, 1: 0.1, 2: 0.1, 3: 0.1}, 0)],
+)
+def test_a_move_keeps_the_stop_that_does_best_or_none(
+    begins_off: dict[int, float], stays: int
+) -> None:
+    """Without a stop elastic joints may begin nearer than with any."""
+    way, piece = np.linspace(0.0, 0.5, 1001), (2.5e-3, 2.5e-3, 2.5e-3)
+    plan = InsertionPlan(open={7: piece}, idle={7: Mock()})
+    task, places = Mock(aim=AIM * TOLERANCE * MM), (0.0, *TAKEN)
+    paths = Mock(way=way)
+    paths.samples.return_value = slice(0, len(way))
+    here = [0]
+    for _ in range(8):
+        paths.after.across = np.full(len(way), begins_off[here[-1]] * MM)
+        now = Mock(task=task, plan=plan, path_to=lambda v: (paths, 0))
+        now.part_of.return_value.wanted = {(7, plan.points.get(7), None): []}
+        plan = insertion_loop._put_on_path(now, plan, 7, 10)
+        stop = plan.points[7][0] * way[-1] if 7 in plan.stops else 0.0
+        here.append(int(np.argmin(np.abs(np.array(places) - stop))))
+    assert here == [0, 1, 2, 3, *([stays] * 5)]
+    assert plan.points == ({7: (places[stays] / way[-1],)} if stays else {})
+
+
 def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
     shop: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

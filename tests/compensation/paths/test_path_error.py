@@ -250,6 +250,16 @@ def test_at_the_targets_the_compensated_program_is_right(ran) -> None:
     assert (paths.way[last] > 0).all() and (np.diff(paths.way[: last[0]]) > 0).all()
 
 
+def test_where_links_come_to_rest_samples_are_close(ran) -> None:
+    """The largest deviation stands there: 0.3 mm farther it may be smaller."""
+    paths = ran[0].paths
+    moved = np.abs(np.diff(paths.side, axis=0)) > 0.02
+    arrives = (moved & (np.abs(paths.side[1:]) > 0.999)).any(axis=1)
+    arrives[paths.first[1:-1] - 1] = False
+    assert arrives.sum() > 10
+    assert np.diff(paths.way)[arrives].max() < 0.3 * MM
+
+
 def test_sides_that_nobody_knows_widen_it(shop: Path, ran) -> None:
     _, setting = ran
     text = "\r\n".join(line for line in job().split("\r\n") if line not in START)

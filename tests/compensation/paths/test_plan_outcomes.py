@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +19,7 @@ from postproc.compensation.paths.plan_outcomes import (
     Objection,
     Predicted,
     expect_better,
+    find_largest,
 )
 from postproc.compensation.paths.plan_outcomes import compare as compare_moves
 from postproc.model.flank_hypotheses import OPEN, FlankKind, FlankOfJoint
@@ -55,6 +57,12 @@ def program(off: float, *cases: FlankCase, errs: tuple[float, ...] = ()) -> Any:
     )  # fmt: skip
 
 
+def largest(plan: Any, found: MoveOutcomes) -> float:
+    """Say how far the move leaves its path at the most."""
+    told = Predicted([plan], np.zeros(8, dtype=np.int64))
+    return find_largest(told, {(7,): found})[7,]
+
+
 def compare(plans: tuple[Any, ...], rows: tuple[int], most: float) -> MoveOutcomes:
     """Compare the plans of one move."""
     told = [Predicted([plan], np.zeros(8, dtype=np.int64)) for plan in plans]
@@ -69,9 +77,8 @@ def case(joint: int, first: int, last: int, off: float, moved: float) -> FlankCa
 
 
 def test_harm_is_counted_place_by_place_and_named() -> None:
-    found = compare(
-        (program(0.1), program(0.02, case(3, 60, 63, 0.2, 0.2))), (7,), TOLERANCE
-    )
+    points = program(0.02, case(3, 60, 63, 0.2, 0.2))
+    found = compare((program(0.1), points), (7,), TOLERANCE)
     objection = found.objection(1)
     assert objection is not None and objection.place == pytest.approx(0.6)
     assert str(objection) == (
@@ -79,7 +86,7 @@ def test_harm_is_counted_place_by_place_and_named() -> None:
     )
     assert "how joint 3 changes its flank" in objection.cure
     assert found.choice == (0, pytest.approx(0.1 * MM))
-    assert found.worst == pytest.approx(0.2 * MM)
+    assert largest(points, found) == pytest.approx(0.2 * MM)
     assert found.objection(0) is None
 
 
@@ -108,7 +115,7 @@ def test_joints_that_err_together_do_what_none_does_alone(
     assert found.choice == (choice[0], pytest.approx(choice[1] * MM))
     together = SIDED * float(np.hypot.reduce(errs)) * MM
     assert found.plans[1].off[1] == pytest.approx(together)
-    assert found.worst == pytest.approx(together)
+    assert largest(plans[1], found) == pytest.approx(together)
     usually = abs(0.06 * MM - together)
     assert found.plans[1].worse[1] == pytest.approx(together - usually)
     objection = found.objection(1)
@@ -126,7 +133,20 @@ def test_the_arm_may_err_along_the_longest_axis_across_the_path() -> None:
     found = compare((program(0.02), plan), (7,), TOLERANCE)
     across = (columns[0] @ columns[0].T)[1:, 1:]
     longest = np.sqrt(np.linalg.eigvalsh(across)[-1])
-    assert found.largest[1] == pytest.approx(0.02 * MM + SIDED * longest)
+    assert largest(plan, found) == pytest.approx(0.02 * MM + SIDED * longest)
+
+
+def test_any_links_may_run_on_together_and_others_not() -> None:
+    """Joints 1 and 2 move the TCP the same way, joint 3 back."""
+    cases = [case(j, 0, 3, abs(0.02 + by), by)
+             for j, by in ((1, 0.1), (2, 0.15), (3, -0.2))]  # fmt: skip
+    cases.append(replace(case(1, 0, 3, 0.07, 0.05), key=(1, FlankKind.RAN_ON, OF_ALL)))
+    ran_on = [replace(one, key=(one.key[0], FlankKind.RAN_ON, one.key[2]), weight=0.06)
+              for one in cases]  # fmt: skip
+    for own, most in ((ran_on, 0.27), (ran_on[:3], 0.18)):
+        plan = program(0.02, *own)
+        found = compare((program(0.02), plan), (7,), TOLERANCE)
+        assert largest(plan, found) == pytest.approx(most * MM)
 
 
 def test_what_the_arm_errs_by_counts_from_a_fifth_of_the_tolerance() -> None:
@@ -143,13 +163,18 @@ def test_the_deviation_is_that_of_95_percent_of_the_way() -> None:
         assert found.objection(1) is None
 
 
-def test_where_a_move_begins_its_largest_deviation_counts() -> None:
+@pytest.mark.parametrize(
+    ("usual_at", "points_at", "harm"),
+    [(4, 2, False), (2, 3, False), (80, 2, True), (4, 2 + round(BEGINS / MM), True)],
+)
+def test_where_a_move_begins_the_largest_deviation_there_counts(
+    usual_at: int, points_at: int, harm: bool
+) -> None:
     usual = program(0.0)
-    usual.after.across[80] = 0.2 * MM
-    for first, harm in ((2, False), (2 + round(BEGINS / MM), True)):
-        points = program(0.0, case(1, first, first + 2, 0.19, 0.2))
-        found = compare((usual, points), (7,), TOLERANCE).objection(1)
-        assert (found is not None) == harm
+    usual.after.across[usual_at] = 0.2 * MM
+    points = program(0.0, case(1, points_at, points_at + 2, 0.19, 0.2))
+    found = compare((usual, points), (7,), TOLERANCE).objection(1)
+    assert (found is not None) == harm
 
 
 def test_joints_with_small_steps_never_speak_against_a_plan() -> None:
