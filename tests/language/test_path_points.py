@@ -138,7 +138,7 @@ def test_arcs_of_rapid_are_cut_in_the_usual_mode(shop, tmp_path):
     usual = text.replace(b"    CirPathMode\\CirPointOri;\n", b"")
     (tmp_path / "job.mod").write_bytes(usual)
     given = ("--cell", cell, "--model", cell.parent / "model.json")
-    to = ("-o", tmp_path / "made.mod", "--path-tolerance", "0.1")
+    to = ("-o", tmp_path / "made.mod", "--path-tolerance", "0.2")
     cli("compensate", tmp_path / "job.mod", *given, *to)
     made = (tmp_path / "made.mod").read_bytes()
     assert b"CirPathMode" in text and b"CirPathMode" not in made

@@ -7,6 +7,7 @@ import tempfile
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.robot.state import make_states
 from postproc.robot.trajectory import Motion
-from postproc.simulation import DEFAULT, virtual_arm
+from postproc.simulation import DEFAULT, run_program, virtual_arm
+from postproc.simulation import path as simulated
 from postproc.simulation.path import _tracks
 from tests.written import cli
 
@@ -93,6 +95,9 @@ def fitted() -> bytes:
         return model.read_bytes()
 
 
+FINE = 1e-4  # [m] between places that are looked at
+
+
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An arm surveyed, and a job compensated for it."""
@@ -102,10 +107,11 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model.write_bytes(fitted())
     done("compensate", folder / "job.pdl", "--cell", CELL, "--model", model,
          "-o", folder / "out.pdl", "--report", folder / "report.json")  # fmt: skip
-    for name in ("job", "out"):
-        done("simulate", folder / f"{name}.pdl", "--cell", CELL, *ARM,
-             "--reference", folder / "job.pdl", "--path",
-             "--report", folder / f"{name}.json")  # fmt: skip
+    with patch.object(simulated, "STEP", FINE):  # links jump between coarse places
+        for name in ("job", "out"):
+            done("simulate", folder / f"{name}.pdl", "--cell", CELL, *ARM,
+                 "--reference", folder / "job.pdl", "--path",
+                 "--report", folder / f"{name}.json")  # fmt: skip
     return folder
 
 
@@ -166,8 +172,10 @@ def real_corners(folder: Path, name: str) -> dict[int, float]:
     cell = load_cell(CELL)
     setup, wanted = setup_of(cell), visits_of(folder / "round.pdl", cell)
     arm = virtual_arm(SEED, DEFAULT, coupling=setup.coupling, rows=1, tool=setup.tool)
-    corner = dict(_tracks(arm, setup, with_stops(wanted)))
-    real = dict(_tracks(arm, setup, visits_of(folder / name, cell)))
+    corner, real = (
+        dict(_tracks(arm, setup, run_program(arm, setup, visits)))
+        for visits in (with_stops(wanted), visits_of(folder / name, cell))
+    )
     found = {}
     for v in real.keys() & corner.keys():
         way = np.vstack([real[k].real for k in (v, v + 1) if k in real])
