@@ -67,7 +67,7 @@ def time_laws(arm: Arm, q: Floats, s: Floats, limit: Floats, begins: Bools) -> R
     """
     first, second = _native.splines(s, q, begins)  # natural: no bend at both ends
     step = np.diff(s, prepend=s[0])
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # of joints that hardly move
         fastest = (arm.velocity / np.abs(first)).min(axis=1)
     bound = np.minimum(np.minimum(limit, fastest), FASTEST)
     paths, most = (first, second), np.asarray(arm.acceleration, dtype=float)
