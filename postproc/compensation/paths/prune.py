@@ -79,8 +79,7 @@ def choose_plans(now: PathPrediction) -> InsertionPlan:
 
     See `choose_plan`: all points, those without the stop that preloads or with a later
     one, those with a later first point, points that correct half of what flanks change
-    by, or none. What a hypothesis
-    speaks against is thinned out later.
+    by, or none. What a hypothesis speaks against is thinned out later.
     """
     visits, chosen = now.task.visits, now.plan
     for rows, compared, plans in _try_plans(now):
