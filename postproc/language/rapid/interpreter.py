@@ -77,6 +77,8 @@ class RapidMachine(TaskMachine):
 
     def run(self) -> None:
         """Follow every way from the main routine."""
+        self.task.frames.clear()  # another machine took fewer data as changing
+        self.task.conditions.clear()
         mains = self.task.routines.get("main", [])
         found = mains if len(mains) == 1 else self._of_kind("proc")
         here = self.begin(frozenset([START]), AT_START)

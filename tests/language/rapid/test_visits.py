@@ -7,7 +7,9 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
+from postproc.language.analysis.task_machine import follow
 from postproc.language.language import Start
+from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.language import Rapid
 from postproc.language.rapid.pose_encoding import (
     RAPID_DIALECT,
@@ -591,3 +593,13 @@ def test_a_frame_that_differs_in_later_rounds_is_not_that_of_the_first():
     found = task("tv:=t;", "WHILE di1=1 DO", move, other, "ENDWHILE", more=tool)
     assert found.visits.frame.tool.tolist() == [-1]
     assert "may be changed by the program" in reasons(found)[0]
+
+
+def test_a_task_that_is_followed_again_reads_its_tools_anew():
+    text = f"MODULE m\n{DATA}\nPROC main()\n{L.format('p1')}\nENDPROC\nENDMODULE\n"
+    found = Rapid().parse([Source("m.mod", text.encode())], Start())
+    first = follow(RapidMachine, found)
+    for known in (found.frames, found.conditions):
+        assert known
+        known.update(dict.fromkeys(known, None))
+    assert follow(RapidMachine, found).visits[0].tool == first.visits[0].tool
