@@ -175,12 +175,20 @@ def _list_moves(
     """Tell of every move as it was run, one after the other."""
     moves, time = list[DrivenMove](), 0.0
     for i, (drive, before, after) in enumerate(steps):
-        path = np.vstack([before.joints, drive.path])
-        tool, moving = poses[visits.frame.tool[i]], after.lasted - SETTLE
-        told = after.speed, time, moving, after.rate, after.why
-        cartesian = bool(visits.motion.kind[i] != Motion.JOINT)
-        kind = cartesian, bool(visits.motion.fly[i])
-        moves.append(DrivenMove(i, path, before.gears, tool, *told, *kind))
+        one = DrivenMove(
+            visit=i,
+            path=np.vstack([before.joints, drive.path]),
+            gears=before.gears,
+            tool=poses[visits.frame.tool[i]],
+            speed=after.speed,
+            begins=time,
+            lasted=after.lasted - SETTLE,
+            rate=after.rate,
+            why=after.why,
+            cartesian=bool(visits.motion.kind[i] != Motion.JOINT),
+            flies=bool(visits.motion.fly[i]),
+        )
+        moves.append(one)
         time += after.lasted
     return tuple(moves)
 

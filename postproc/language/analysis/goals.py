@@ -185,7 +185,7 @@ class GoalReader(ABC):
         if goal is None:
             why = self.explain_unknown(name) if name else AT_RUN_TIME
             return self.unknown(why, name)
-        partial = goal.why.code is Code.PARTIAL_TARGET  # it may be told elsewhere
+        partial = goal.why.code is Code.PARTIAL_TARGET  # the rest may stand elsewhere
         if goal.target == Meaning.UNKNOWN or (name and partial):
             return self.unknown(goal.why, name)
         if not (name or goal.slots[0] >= 0):

@@ -103,8 +103,8 @@ class KrlVisit(goals.FoundVisit):
 def _reach(goal: FoundGoal, by_joints: bool, alone: bool) -> FoundGoal:
     """Return where a move to a point leads, as far as that is followed.
 
-    Missing numbers are those of axes, or of X, Y, Z on a line: of A, B, C the others
-    cannot be told by where the arm is, and a joint move needs S and T.
+    Missing numbers are those of axes, or of X, Y, Z on a line. Where the arm stands
+    does not give missing ones of A, B, C, and a joint move needs S and T.
 
     Args:
         goal: The point.
