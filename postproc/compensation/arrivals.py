@@ -107,27 +107,6 @@ class ArrivalStates:
 
         return self._by_block(rows, both, 2)
 
-    def predict(self, rows: Ints) -> Floats:
-        """Predict the error at some visits, and how it scatters, (r, 4, 3).
-
-        Args:
-            rows: Visits, ascending, as for `shares`.
-
-        Returns:
-            The error [m]; xx, yy, zz and xy, xz, yz of its covariance at one arrival
-            [m^2], widened as held-out readings scatter more than their noise; and 1
-            where the state is outside of what was surveyed, else 0. NaN where joint
-            angles or the tool are not known.
-        """
-
-        def every(arm: Arm, states: States) -> Floats:
-            found = self.model.predict(arm, states)
-            wide = max(self.model.reading_spread, 1.0) ** 2 * found.covariance
-            outside = np.repeat(found.any_outside[:, None].astype(float), 3, axis=1)
-            return np.stack([found.error, wide[:, :3], wide[:, 3:], outside], axis=1)
-
-        return self._by_block(rows, every, 4)
-
     def _by_block(
         self, rows: Ints, evaluate: Callable[[Arm, States], Floats], k: int
     ) -> Floats:

@@ -42,7 +42,7 @@ from postproc.compensation.outcome import (
     list_uncorrected_elsewhere,
     tell_arrivals,
 )
-from postproc.compensation.pipeline import CompensatedProgram, WindowResult, correct
+from postproc.compensation.pipeline import correct
 from postproc.compensation.program import (
     ParsedProgram,
     prepare_cell,
@@ -60,6 +60,7 @@ from postproc.compensation.rewrite import (
 )
 from postproc.compensation.sidecar import Sidecar
 from postproc.compensation.targets import report_rounded_points, unknown_blends
+from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.compensation.workers import in_worker
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
@@ -340,7 +341,6 @@ def report(
         setting: What it was compensated with.
     """
     kept, output, visits = draft.kept, draft.output, reading.visits
-    arrivals = _arrivals(visits, kept, setting)
     off = (
         report_controller_assumption(name, setting.cell),
         *controller_unknown(name, setting.cell),
@@ -352,17 +352,15 @@ def report(
         record=_record(reading, draft, setting),
         visits=visits,
         decisions=kept.decisions,
-        before=ErrorStatistics.of_sizes(kept.before),
-        after=ErrorStatistics.of_sizes(kept.after),
+        before=ErrorStatistics.of_sizes(kept.before[kept.corrected]),
+        after=ErrorStatistics.of_sizes(kept.after[kept.corrected]),
         diagnostics=deduplicate((*_findings(reading, draft, setting), *off)),
         stages=setting.clock.stages,
         motion=largest_motion(kept.departure),
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
-        arrivals=arrivals,
-        expected=expect_errors(
-            arrivals, kept.decisions.correction, find_judged(visits, kept.decisions)
-        ),
+        arrivals=_arrivals(visits, kept, setting),
+        expected=expect_errors(kept.laws, find_judged(visits, kept.decisions)),
         in_time=draft.in_time,
     )
 

@@ -23,9 +23,9 @@ from postproc.compensation.inverse_model import (
     Commands,
     angles_astray,
     change_mm,
+    foresee,
     new_numbers,
     solve_written,
-    std_errors_at,
     turns_in_file,
 )
 from postproc.compensation.options import Job, Options
@@ -810,9 +810,9 @@ class Round:
             np.maximum.at(high, found.group[rows], frame[rows])
             apart &= low >= high
         mine = np.flatnonzero((found.group >= 0) & apart[found.group])
-        given = job.model, job.cell, self.states, self.solved, mine
+        solved = foresee(job.model, job.cell, self.states, self.solved, mine)
         std_mm = np.full(len(visits), np.nan)
-        std_mm[mine] = lengths(std_errors_at(*given)) / MM
+        std_mm[mine] = lengths(solved.std_error[mine]) / MM
         return average(found, numbers, change, apart, std_mm)
 
     def _find_pinned(

@@ -18,9 +18,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import gammaincinv, ndtr, ndtri
 
-from postproc.arrays import Bools, Floats, Indices, chunks, map_chunks
-from postproc.compensation.arrivals import ArrivalStates
-from postproc.model.model import CHUNK
+from postproc.arrays import Bools, Floats, Indices, any_in_rows, chunks, map_chunks
+from postproc.model.model import CHUNK, Prediction
 from postproc.model.variance import covariance_times
 from postproc.operating_system import count_cores
 
@@ -138,6 +137,43 @@ def _floor(covariance: Floats, square: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
+class ErrorLaws:
+    """Distributions of the lengths of errors of n visits, NaN where not known.
+
+    Attributes:
+        before: Without any correction.
+        after: With the correction that was made.
+        outside: Whether the state is outside of what was surveyed, (n,).
+    """
+
+    before: LengthLaw
+    after: LengthLaw
+    outside: Bools
+
+    @classmethod
+    def of(
+        cls, found: Prediction, spread: float, correction: Floats, judged: Bools
+    ) -> ErrorLaws:
+        """Tell how the errors of n visits are distributed.
+
+        Args:
+            found: The predicted errors.
+            spread: How held-out readings scatter against their noise, see
+                `Model.reading_spread`; below 1 it is taken as 1.
+            correction: Change of their commanded TCP, base frame, (n, 3) [m]; zero
+                where nothing was corrected.
+            judged: Whether visits have a target that they can miss, (n,).
+        """
+        unsure = np.isnan(found.error + found.covariance[:, :3] + correction)
+        rows = np.flatnonzero(judged & ~any_in_rows(unsure))
+        covariance = max(spread, 1.0) ** 2 * found.covariance[rows]
+        first, last = LengthLaw.unknown(len(judged)), LengthLaw.unknown(len(judged))
+        for law, mean in ((first, found.error), (last, found.error + correction)):
+            law.put(rows, LengthLaw.of_normal(mean[rows], covariance))
+        return cls(first, last, found.any_outside)
+
+
+@dataclass(frozen=True, eq=False)
 class ExpectedErrors:
     """Expected true errors of n visits; lengths in metres, NaN where not known.
 
@@ -172,42 +208,24 @@ class ExpectedErrors:
         return self.judged & np.isnan(self.high)
 
 
-def expect_errors(
-    arrivals: ArrivalStates, correction: Floats, judged: Bools
-) -> ExpectedErrors:
+def expect_errors(laws: ErrorLaws, judged: Bools) -> ExpectedErrors:
     """Estimate what every visit keeps of its error.
 
     Args:
-        arrivals: How the arm arrives at n visits.
-        correction: Change of their commanded TCP, base frame, (n, 3) [m]; zero where
-            nothing was corrected.
+        laws: The distributions of the errors of n visits.
         judged: Whether visits have a target that they can miss, (n,).
     """
-    n = len(arrivals.visits)
-    first, last = LengthLaw.unknown(n), LengthLaw.unknown(n)
-    outside, (before, after, high) = np.zeros(n, dtype=bool), np.full((3, n), np.nan)
+    first, last = laws.before, laws.after
+    before, after, high = np.full((3, len(judged)), np.nan)
 
     def expect(some: slice) -> None:
-        found = arrivals.predict(np.arange(some.start, some.stop))
-        error, covariance = found[:, 0], found[:, 1:3].reshape(-1, 6)
-        unsure = np.isnan(found[:, 0] + found[:, 1] + correction[some]).any(axis=1)
-        own = np.flatnonzero(judged[some] & ~unsure)
-        rows = some.start + own
-        laws = [
-            LengthLaw.of_normal(mean[own], covariance[own])
-            for mean in (error, error + correction[some])
-        ]
-        first.put(rows, laws[0])
-        last.put(rows, laws[1])
-        outside[some] = found[:, 3, 0] > 0.0
-        before[rows], after[rows], high[rows] = (
-            laws[0].mean, laws[1].mean, laws[1].bound
-        )  # fmt: skip
+        before[some], after[some] = first[some].mean, last[some].mean
+        high[some] = last[some].bound
 
-    map_chunks(expect, n, CHUNK, count_cores())  # predictions need many times the room
+    map_chunks(expect, len(judged), CHUNK, count_cores())
     known = ~np.isnan(high)
     return ExpectedErrors(
-        judged, last, outside, before, after, high,
+        judged, last, laws.outside, before, after, high,
         below=pool_bound(last[known], np.max(high[known], initial=0.0)),
         below_before=pool_bound(
             first[known], WIDE * np.max(before[known], initial=0.0)

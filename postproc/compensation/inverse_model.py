@@ -18,8 +18,9 @@ from postproc.compensation.program import PlannedProgram
 from postproc.compensation.targets import few_frames
 from postproc.exceptions import ModelError
 from postproc.language.visits import Meaning, Visits
+from postproc.model.evaluator import PredictedErrors
 from postproc.model.kinematics import ArmStates
-from postproc.model.model import UNSURE, Model
+from postproc.model.model import UNSURE, Model, Prediction
 from postproc.motion.path import circles
 from postproc.motion.planner import Plan
 from postproc.robot.arm import Arm
@@ -131,8 +132,9 @@ class Commands:
         command: TCP poses to command, base frame, (n, 4, 4) [m].
         turn: Rotation of the commands against the targets, (n, 3) [rad].
         residual: Predicted landing against the wanted position, (n,) [m].
-        std_error: Standard error of the model there, per axis, (n, 3) [m], as far as
-            that was asked for.
+        foreseen: The error predicted there, as far as its standard error was asked for;
+            where the load was not surveyed, for the nearest that was.
+        std_error: Standard error of the model there, per axis, (n, 3) [m], likewise.
         outside: Reasons why visits lie outside what was surveyed, (n,) each.
     """
 
@@ -142,6 +144,7 @@ class Commands:
     command: Floats
     turn: Floats
     residual: Floats
+    foreseen: PredictedErrors
     std_error: Floats
     outside: dict[str, Bools]
 
@@ -182,6 +185,7 @@ def solve_visits(
         command=np.full((n, 4, 4), np.nan),
         turn=np.full((n, 3), np.nan),
         residual=np.full(n, np.nan),
+        foreseen=PredictedErrors.unknown(n),
         std_error=np.full((n, 3), np.nan),
         outside=_outside_survey(model, cell, known, states),
     )
@@ -220,6 +224,7 @@ def solve_again(
         command=np.array(solved.command),
         turn=np.array(solved.turn),
         residual=np.array(solved.residual),
+        foreseen=solved.foreseen.copy(),
         std_error=np.array(solved.std_error),
         outside=dict(solved.outside),
     )
@@ -227,9 +232,10 @@ def solve_again(
     out.turn[known] = turns_between(part.command, plan.tcp[known])
     out.residual[known] = part.residual
     near = with_surveyed_load(model, cell, here)
-    std = model.std_on_flanks(cell.arm, near)
-    out.std_error[known] = np.hypot(std, load_error(model, cell, here))
-    _mark(out.outside, UNSURE, known, model.unsure(std), len(rows))
+    found = model.predict_on_flanks(cell.arm, near)
+    out.foreseen.put(known, found)
+    out.std_error[known] = np.hypot(found.std, load_error(model, cell, here))
+    _mark(out.outside, UNSURE, known, model.unsure(found.std), len(rows))
     if orientation:
         spread = turn_std(model, cell.arm, here)
         unsure = np.asarray(np.linalg.norm(spread, axis=1) > UNSURE_RAD)
@@ -237,28 +243,57 @@ def solve_again(
     return out
 
 
-def std_errors(model: Model, cell: Cell, states: States, solved: Commands) -> Floats:
-    """Standard errors of the errors that visits are corrected for, per axis.
+def foresee(
+    model: Model, cell: Cell, states: States, solved: Commands, rows: Ints | None = None
+) -> Commands:
+    """Predict the errors that visits are corrected for, with their standard errors.
 
-    They are many times as costly as the errors: what solving has asked for is kept, the
-    others are wanted of the last round alone.
+    These are many times as costly as the errors: what solving has asked for is kept,
+    the others are wanted of the last round alone.
 
-    Returns:
-        (n, 3) [m], NaN where pose or joint angles are not known.
+    Args:
+        model: The arm's error.
+        cell: The arm.
+        states: Planned states of n visits.
+        solved: Their commands.
+        rows: Those to predict, default: all of known pose and joint angles.
     """
-    out = np.array(solved.std_error)
-    rows = np.flatnonzero(solved.known & np.isnan(out[:, 0]))
-    out[rows] = std_errors_at(model, cell, states, solved, rows)
-    return out
-
-
-def std_errors_at(
-    model: Model, cell: Cell, states: States, solved: Commands, rows: Ints
-) -> Floats:
-    """Standard errors at some visits of known joint angles, per axis, (k, 3) [m]."""
+    wanted = solved.known & np.isnan(solved.std_error[:, 0])
+    rows = np.flatnonzero(wanted) if rows is None else rows[wanted[rows]]
     here = states.with_(direction=solved.direction)[rows]
     near = with_surveyed_load(model, cell, here)
-    return np.hypot(model.std_error(cell.arm, near), load_error(model, cell, here))
+    foreseen, std_error = solved.foreseen.copy(), np.array(solved.std_error)
+    found = model.evaluator(cell.arm).predict(near)
+    foreseen.put(rows, found)
+    std_error[rows] = np.hypot(found.std, load_error(model, cell, here))
+    return replace(solved, foreseen=foreseen, std_error=std_error)
+
+
+def predict_arrivals(
+    model: Model, cell: Cell, states: States, solved: Commands
+) -> Prediction:
+    """Predict the errors that visits are corrected for, with what they carry.
+
+    Args:
+        model: The arm's error.
+        cell: The arm.
+        states: Planned states of n visits.
+        solved: Their commands, with all that is foreseen, see `foresee`.
+
+    Returns:
+        NaN where pose or joint angles are not known.
+    """
+    here, found = states.with_(direction=solved.direction), solved.foreseen
+    evaluator = model.evaluator(cell.arm)
+    near = with_surveyed_load(model, cell, here)
+    other = (near.payload != here.payload) & ~np.isnan(here.payload)
+    if evaluator.given:  # they may depend on the visit before
+        other = np.ones(len(here), dtype=bool)
+    rows = np.flatnonzero(solved.known & other)
+    if len(rows):
+        found = found.copy()
+        found.put(rows, evaluator.predict(here[rows]))
+    return model.describe(here, found)
 
 
 def turns_between(new: Floats, old: Floats) -> Floats:

@@ -38,9 +38,10 @@ from postproc.compensation.decisions import (
 from postproc.compensation.flag_borders import turn_from_borders
 from postproc.compensation.inverse_model import (
     Commands,
+    foresee,
+    predict_arrivals,
     solve_again,
     solve_visits,
-    std_errors,
 )
 from postproc.compensation.options import Clock, Job
 from postproc.compensation.program import ParsedProgram, PlannedProgram
@@ -49,6 +50,7 @@ from postproc.compensation.targets import move_targets
 from postproc.language.text.number_edits import edits as number_edits
 from postproc.language.text.source import Replacements
 from postproc.language.visits import Visits
+from postproc.model.model import Prediction
 from postproc.motion.deviation import JointDeviation, departure, path_departure
 from postproc.motion.joint_path import NOWHERE, StartState
 from postproc.motion.planner import Plan
@@ -403,12 +405,14 @@ class Converged:
         edits: The edits that write it.
         reached: Where these numbers lead.
         moved: How far the ways lead the arm from where it was, n visits.
+        foreseen: The errors predicted at the arrivals that they are corrected for.
     """
 
     proposal: Proposal
     edits: tuple[Replacements, ...]
     reached: Reached
     moved: JointDeviation
+    foreseen: Prediction
 
 
 def iterate(
@@ -549,9 +553,10 @@ def _read_back(
     if flipped.any():
         return None, flipped
     with setting.clock("solve"):
-        model, cell = setting.model, setting.cell
-        std_error = std_errors(model, cell, iteration.states, current.solved)
-        std_error = iteration.planned.with_frame(std_error)
+        given = setting.model, setting.cell, iteration.states
+        solved = foresee(*given, current.solved)
+        foreseen = predict_arrivals(*given, solved)
+        std_error = iteration.planned.with_frame(solved.std_error)
         shared = proposal.left_mm * MM / np.sqrt(3.0)  # an axis
         std_error = np.hypot(std_error, shared[:, None])
     decided = replace(proposal.decisions, std_error=std_error)
@@ -561,7 +566,7 @@ def _read_back(
         arm, tool, offset = job.cell.arm, plan.tool[:, :3, 3], job.offset
         move, q = last.targets.move, last.exact.q
         moved = path_departure(arm, move, tool, plan.exact, q, last.edges.join, offset)
-    return Converged(proposal, edits, last.reached, moved), flipped
+    return Converged(proposal, edits, last.reached, moved, foreseen), flipped
 
 
 def write_and_read_back(

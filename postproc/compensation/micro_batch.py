@@ -10,7 +10,7 @@ and 134 beside four others.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import ParamSpec, TypeVar
 
@@ -20,9 +20,10 @@ from postproc.compensation.compensate import check_preconditions, finish
 from postproc.compensation.first_cause import read_with_cause
 from postproc.compensation.options import Clock, Job, Options, no_progress
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.pipeline import WindowResult, correct
+from postproc.compensation.pipeline import correct
 from postproc.compensation.program import ParsedProgram, prepare_cell
 from postproc.compensation.program_files import name_files
+from postproc.compensation.window_result import WindowResult
 from postproc.compensation.windowing import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
@@ -145,26 +146,14 @@ def correct_batch(
 def _split(
     kept: WindowResult, readings: Sequence[ParsedProgram]
 ) -> Iterator[WindowResult]:
-    moved = np.append(0, np.cumsum(kept.corrected))
+    """Give every program what is told of its visits."""
     visits = offsets([len(reading.visits) for reading in readings])
     literals = offsets([len(reading.visits.literals) for reading in readings])
     files = offsets([len(reading.texts) for reading in readings])
     edited = np.searchsorted(kept.edited, literals).tolist()
     for k in range(len(readings)):
-        rows = slice(*visits[k : k + 2])
-        found = slice(*moved[visits[k : k + 2]])
-        yield WindowResult(
+        yield replace(
+            kept.take(slice(*visits[k : k + 2])),
             edited=kept.edited[slice(*edited[k : k + 2])] - literals[k],
             edits=kept.edits[slice(*files[k : k + 2])],
-            decisions=kept.decisions.part(rows),
-            corrected=kept.corrected[rows],
-            before=kept.before[found],
-            after=kept.after[found],
-            position=kept.position[rows],
-            away=kept.away[rows],
-            overruled=kept.overruled[rows],
-            untimed=kept.untimed[rows],
-            travel=kept.travel[rows],
-            speed=kept.speed[rows],
-            departure=kept.departure[rows],
         )

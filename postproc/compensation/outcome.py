@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -98,15 +98,6 @@ class Decisions:
     correction: Floats
     std_error: Floats
     turn: Floats = field(default_factory=lambda: np.empty((0, 3)))
-
-    def part(self, rows: slice | Ints) -> Decisions:
-        """Take the decisions for some visits."""
-        columns = {f.name: getattr(self, f.name) for f in fields(self)}
-        del columns["reasons"]
-        own = {
-            k: column[rows] if len(column) else column for k, column in columns.items()
-        }
-        return replace(self, **own)
 
     def count(self, status: Status) -> int:
         """Count the visits of one status."""

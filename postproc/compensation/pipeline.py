@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import (
-    Bools,
-    Floats,
-    Indices,
-    Interned,
-    isin_sorted,
-    release_memory,
-)
+from postproc.arrays import Bools
 from postproc.compensation import windowing as cuts
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.consensus import (
@@ -26,12 +19,10 @@ from postproc.compensation.consensus import (
     same_looks,
     same_rows,
 )
-from postproc.compensation.decisions import Proposal, with_what_moves_along
-from postproc.compensation.eligibility import find_overruled
+from postproc.compensation.decisions import Proposal
 from postproc.compensation.iterate import (
     FROM_START,
     Boundary,
-    Converged,
     NotAloneError,
     iterate,
 )
@@ -39,10 +30,7 @@ from postproc.compensation.options import (
     Clock,
     Job,
 )
-from postproc.compensation.outcome import (
-    Decisions,
-    Status,
-)
+from postproc.compensation.outcome import Status
 from postproc.compensation.program import (
     ParsedProgram,
     PlannedProgram,
@@ -53,193 +41,23 @@ from postproc.compensation.rewrite import (
     check_motion,
 )
 from postproc.compensation.taught_frames import correct_taught
+from postproc.compensation.window_result import (
+    WindowResult,
+    correction_of,
+    example_of,
+    finish,
+    in_shared_memory,
+    room_like,
+)
 from postproc.compensation.windowing import Window, cut_points, seams, windows
 from postproc.compensation.workers import in_processes
-from postproc.diagnostics import NO_REASON
-from postproc.language.text.source import Replacements
-from postproc.language.visits import Graph, Visits
-from postproc.model.model import Model
+from postproc.language.visits import Graph
 from postproc.motion.joint_path import StartState
-from postproc.robot.cell import Cell
 from postproc.robot.direction import UNLED, Arrivals
-from postproc.robot.pose import MM
-from postproc.robot.state import States
 from postproc.robot.trajectory import Motion
 
 if TYPE_CHECKING:
-    from postproc.compensation.rewrite import Output
-    from postproc.compensation.timing_comparison import InTime
-
-# What is kept of a program, or of a window of it, once its targets are corrected.
-
-
-@dataclass(frozen=True)
-class WindowResult:
-    """A corrected program without poses, paths and plans (structure of arrays).
-
-    Attributes:
-        edited: Literals that get new numbers, (m,).
-        edits: The edits of these, file by file.
-        decisions: What was decided for n visits.
-        corrected: Visits whose target moves, (n,).
-        before, after: Size of the predicted error of the k visits that move, (k,) [m].
-        position: Where the program wants the TCP, (n, 3) [m], base frame.
-        away: How far the path passes it, (n,) [mm].
-        overruled: The path does not follow the configuration string, and nobody said
-            that it must, (n,).
-        untimed: No time law was found, (n,).
-        travel: Of every joint since its last reversal, (n, 6) [rad].
-        speed: Of the TCP, (n,) [m/s], NaN where nobody asked.
-        departure: Largest change on the way to every visit of a joint [rad], elbow,
-            wrist centre and TCP [m], (n, 4), NaN where not known; of a part its
-            largest, one row.
-    """
-
-    edited: Indices
-    edits: tuple[Replacements, ...]
-    decisions: Decisions
-    corrected: Bools
-    before: Floats
-    after: Floats
-    position: Floats
-    away: Floats
-    overruled: Bools
-    untimed: Bools
-    travel: Floats
-    speed: Floats
-    departure: Floats
-
-    def part(self, visits: Visits, own: slice) -> WindowResult:
-        """Keep some of these visits, which share no number with the others.
-
-        Args:
-            visits: All visits.
-            own: Those to keep.
-        """
-        moved = np.flatnonzero(self.corrected)
-        rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
-        literals = np.sort(visits.target.literal[own])
-        mine = isin_sorted(self.edited, literals)
-        starts = np.sort(visits.literals.places[self.edited[mine]].start, axis=None)
-        edits = tuple(
-            Replacements(e.start[at], e.end[at], e.new[at])
-            for e in self.edits
-            for at in [isin_sorted(e.start, starts)]
-        )
-        return replace(
-            self, edited=self.edited[mine].astype(np.int32), edits=edits,
-            before=self.before[rows], after=self.after[rows],
-            decisions=self.decisions.part(own),
-            departure=np.fmax.reduce(self.departure[own], axis=0, keepdims=True),
-            **{
-                name: np.array(getattr(self, name)[own])
-                for name in (*BY_VISIT, *EXPLAINING)
-            },
-        )  # fmt: skip
-
-    def rows(self, some: slice) -> dict[str, NDArray[Any]]:
-        """Return what is kept of some visits."""
-        decided = self.decisions.part(some)
-        names = (*BY_VISIT, *EXPLAINING, "departure")
-        found = {name: np.array(getattr(self, name)[some]) for name in names}
-        for f in fields(Decisions):
-            if f.name not in ("why", "reasons"):
-                found[f"decided {f.name}"] = np.array(getattr(decided, f.name))
-        why = [decided.reasons[k] for k in decided.why.tolist()]
-        return found | {"why": np.array(why, dtype=object)}
-
-
-BY_VISIT = ("corrected", "position", "away", "overruled", "untimed")
-EXPLAINING = ("travel", "speed")
-
-
-@dataclass(frozen=True)
-class CompensatedProgram:
-    """A corrected program, before it is told of.
-
-    Attributes:
-        reading: The program.
-        kept: What came of its visits.
-        output: What is to be written.
-        in_time: The program in time; None where nobody asked.
-    """
-
-    reading: ParsedProgram
-    kept: WindowResult
-    output: Output
-    in_time: InTime | None
-
-
-def correction_of(
-    visits: Visits,
-    planned: PlannedProgram,
-    states: States,
-    found: Converged,
-    cell: Cell,
-    model: Model,
-) -> WindowResult:
-    """Keep what a report says of corrected visits."""
-    proposal, done, plan = found.proposal, found.reached, planned.plan
-    moved = proposal.corrected
-    new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
-    wanted = plan.tcp[:, :3, 3] + planned.shift
-    before = model.error(cell.arm, states[moved]) - planned.shift[moved]
-    after = done.tcp[moved, :3, 3] + model.error(cell.arm, new) - wanted[moved]
-    return WindowResult(
-        edited=proposal.edited,
-        edits=found.edits,
-        decisions=with_what_moves_along(visits, planned, cell, proposal.decisions),
-        corrected=moved,
-        before=np.linalg.norm(before, axis=1),
-        after=np.linalg.norm(after, axis=1),
-        position=wanted - plan.aside,
-        away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1) / MM,
-        overruled=find_overruled(planned.targets, plan).find_unchecked(visits),
-        untimed=plan.untimed,
-        travel=plan.travel,
-        speed=plan.speed,
-        departure=found.moved.sizes,
-    )
-
-
-def join_windows(parts: list[WindowResult]) -> WindowResult:
-    """Put the windows of a program one after the other.
-
-    Args:
-        parts: The windows; the list is emptied, and nothing is held twice for long.
-    """
-    if len(parts) == 1:
-        return parts[0]
-    own = [dict(vars(part)) for part in parts]
-    decisions = [dict(vars(part.pop("decisions"))) for part in own]
-    parts.clear()
-    edits = zip(*(part.pop("edits") for part in own), strict=True)
-    return WindowResult(
-        edits=tuple(Replacements.merge(some) for some in edits),
-        decisions=_one_after_another(decisions),
-        **{name: _column(name, own) for name in list(own[0])},
-    )
-
-
-def _one_after_another(parts: Sequence[dict[str, Any]]) -> Decisions:
-    """Join decisions, and their reasons; the parts are emptied."""
-    numbers = Interned([NO_REASON])
-    for part in parts:
-        why, reasons = part["why"], part.pop("reasons")
-        new = np.zeros(len(reasons), dtype=np.int32)
-        for k in np.unique(why).tolist():
-            new[k] = numbers[reasons[k]]
-        part["why"] = new[why]
-    columns = {name: _column(name, parts) for name in list(parts[0])}
-    return Decisions(reasons=tuple(numbers), **columns)
-
-
-def _column(name: str, parts: Sequence[dict[str, Any]]) -> NDArray[Any]:
-    """Take a column from all parts, and join it."""
-    column = np.concatenate([part.pop(name) for part in parts])
-    release_memory(len(column))
-    return column
-
+    pass
 
 # A program corrected window by window, so that only one is in memory at a time.
 
@@ -250,7 +68,7 @@ class Corrected:
 
     Attributes:
         window: The window.
-        kept: What is kept of its own visits.
+        kept: What is kept of it but for its visits.
         trail: What was looked at at its ends.
         left: What came of the visits beside the cut before it.
         right: .. of those beside the cut behind, and of the next window's halo.
@@ -304,14 +122,17 @@ def _in_windows(reading: ParsedProgram, setting: Job) -> WindowResult:
         return _whole(reading, setting)[0]
     stops = cut_points(reading.visits)
     quiet = stops if timed else seams(reading.visits)
-    work = _WindowWork(reading, setting, quiet, stops)
     cut = windows(quiet, cuts.share(len(quiet), setting.processes))
     if len(cut) > 1:
+        make = np.empty if setting.processes == 1 else in_shared_memory
+        width = reading.visits.target.values.shape[1]
+        example = example_of(width, setting.options.orientation)
+        room = room_like(example, len(quiet), make)
+        work = _WindowWork(reading, setting, quiet, stops, room)
         try:
             found = in_processes(work, cut, setting.clock, setting.processes)
-            parts = [part.kept for part in found]
-            found.clear()
-            return join_windows(parts)
+            ends = [0, *(part.window.end for part in found)]
+            return finish(room, [part.kept for part in found], ends)
         except NotAloneError:
             pass
     return _whole(reading, setting)[0]
@@ -363,12 +184,14 @@ class _WindowWork:
         setting: What it is compensated with.
         quiet: Behind which visits it may be cut, (n,).
         stops: .. where the arm stops, (n,).
+        room: What is kept of all visits is put there.
     """
 
     reading: ParsedProgram
     setting: Job
     quiet: Bools
     stops: Bools
+    room: WindowResult
 
     def correct(self, own: Window, before: Corrected | None, clock: Clock) -> Corrected:
         """Correct a window; see `parallel.Work`.
@@ -389,10 +212,11 @@ class _WindowWork:
         planned, kept, _ = _correct_visits(
             part, setting, lead, arrived, doubtful, trail
         )
+        self.room.put(slice(own.first, own.end), kept, own.own)
         at, rows = after - own.begin, own.rows(after, own.end)
         return Corrected(
             window=own,
-            kept=kept.part(visits, own.own),
+            kept=kept.of_window(visits, own.own),
             trail=trail,
             left=kept.rows(trail.left),
             right=kept.rows(trail.right),

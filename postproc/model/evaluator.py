@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Floats, Ints, few_rows, floats
+from postproc.arrays import Bools, Floats, Indices, Ints, few_rows, floats
 from postproc.model.covariate import covariate
 from postproc.model.effect_sum import Combination
 from postproc.model.effects.effect import Effect, JointEffect
@@ -45,6 +45,41 @@ class CoreStates:
     tool: Floats
     load: Floats
     given: Floats
+
+
+@dataclass(frozen=True)
+class PredictedErrors:
+    """Predicted errors of n states, NaN where nobody has asked.
+
+    Attributes:
+        error: Actual minus nominal TCP position, base frame, (n, 3) [m].
+        known: Covariance of that error, (n, 6) [m^2]: xx, yy, zz, then xy, xz, yz.
+        arrival: .. of the error of one arrival, with repeatability, likewise.
+    """
+
+    error: Floats
+    known: Floats
+    arrival: Floats
+
+    @classmethod
+    def unknown(cls, n: int) -> PredictedErrors:
+        """Make room for n predictions."""
+        return cls(*(np.full((n, width), np.nan) for width in (3, 6, 6)))
+
+    def put(self, rows: Indices | Bools, found: PredictedErrors) -> None:
+        """Enter some predictions, in place."""
+        self.error[rows], self.known[rows] = found.error, found.known
+        self.arrival[rows] = found.arrival
+
+    def copy(self) -> PredictedErrors:
+        """Return predictions that can change on their own."""
+        columns = self.error, self.known, self.arrival
+        return PredictedErrors(*map(np.array, columns))
+
+    @property
+    def std(self) -> Floats:
+        """Standard error of the predicted error per axis, (n, 3) [m]."""
+        return np.asarray(np.sqrt(np.maximum(self.known[:, :3], 0.0)))
 
 
 @dataclass(frozen=True)
@@ -107,14 +142,9 @@ class Evaluator:
         poses = floats(wanted), floats(few_rows(tool))
         return _native.commands(self.core, self.arm.solver, *poses, laid, turns)
 
-    def predict(self, states: States) -> tuple[Floats, Floats, Floats]:
-        """Predict errors, and how sure they are.
-
-        Returns:
-            Errors (n, 3) [m], and the covariances of errors and of one arrival each,
-            (n, 6) [m^2]: xx, yy, zz, then xy, xz, yz.
-        """
-        return self.core.predict(self.states(states))
+    def predict(self, states: States) -> PredictedErrors:
+        """Predict errors, and how sure they are."""
+        return PredictedErrors(*self.core.predict(self.states(states)))
 
 
 def _column(batch: ArmStates, effect: JointEffect, column: int) -> Floats:

@@ -19,7 +19,13 @@ from postproc.model.cache import ArmCache
 from postproc.model.doubt import Doubt
 from postproc.model.effect_sum import Combination
 from postproc.model.effects import restore
-from postproc.model.evaluator import Evaluator, Scatter, Spread, make_evaluator
+from postproc.model.evaluator import (
+    Evaluator,
+    PredictedErrors,
+    Scatter,
+    Spread,
+    make_evaluator,
+)
 from postproc.model.kinematics import ArmStates
 from postproc.model.model_file import (
     FORMAT,
@@ -344,28 +350,30 @@ class Model:
         Where a direction is not known (0), the error is that of the middle of the gap,
         and half the gap enters both standard deviations.
         """
-        error, known, arrival = self.evaluator(arm).predict(states)
-        model = np.sqrt(np.maximum(known[:, :3], 0.0))
+        return self.describe(states, self.evaluator(arm).predict(states))
+
+    def describe(self, states: States, found: PredictedErrors) -> Prediction:
+        """Say how sure errors are that were predicted of states, as `predict` does."""
         outside = self.ranges.outside(states, self.needs, self.bent)
-        unsure = _on_flanks(states) & any_in_rows(model > self._certain_up_to)
+        unsure = _on_flanks(states) & any_in_rows(found.std > self._certain_up_to)
         if unsure.any():
             outside[UNSURE] = unsure
-        return Prediction(error, model, arrival, outside)
+        return Prediction(found.error, found.std, found.arrival, outside)
 
     def std_error(self, arm: Arm, states: States) -> Floats:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
-        variance = self.evaluator(arm).predict(states)[1][:, :3]
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        return self.evaluator(arm).predict(states).std
 
-    def std_on_flanks(self, arm: Arm, states: States) -> Floats:
-        """Standard error where the directions of all joints are known, (n, 3) [m].
+    def predict_on_flanks(self, arm: Arm, states: States) -> PredictedErrors:
+        """Predict errors where the directions of all joints are known.
 
-        NaN elsewhere, and everywhere where a survey does not say what is too large.
+        NaN elsewhere, and everywhere where a survey does not say what is too large a
+        standard error.
         """
-        out = np.full((len(states), 3), np.nan)
+        out = PredictedErrors.unknown(len(states))
         rows = np.flatnonzero(_on_flanks(states))
         if len(rows) and np.isfinite(self._certain_up_to):
-            out[rows] = self.std_error(arm, states[rows])
+            out.put(rows, self.evaluator(arm).predict(states[rows]))
         return out
 
     def unsure(self, std_on_flanks: Floats) -> Bools:

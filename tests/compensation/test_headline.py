@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from postproc.compensation.expected_error import expect_errors
+from postproc.compensation.expected_error import ErrorLaws, expect_errors
 from postproc.compensation.headline import ProgramErrors, headline, list_exceptions
 from postproc.compensation.tolerance import check_tolerance
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.text.stamp import read_stamp
 from postproc.language.visits import Meaning
+from postproc.model.model import Prediction
 from tests.made_visits import visits as made_visits
 from tests.written import FIRST, NEXT, POSE, cli, program
 
@@ -26,11 +26,11 @@ def errors_of(kept=(), unknown=(), tolerance=None, side=()):
     error = np.tile([1.7e-3, 0.0, 0.0], (N, 1))
     error[list(unknown)] = np.nan
     left = np.isin(np.arange(N), kept)
-    none = np.zeros((N, 3))
-    found = np.stack([error, np.full((N, 3), 1e-10), none, none], axis=1)
-    arrivals = SimpleNamespace(visits=[None] * N, predict=lambda rows: found)
+    covariance = np.hstack([np.full((N, 3), 1e-10), np.zeros((N, 3))])
+    told = Prediction(error, np.full((N, 3), 1e-5), covariance, {})
     correction = np.where(left[:, None], 0.0, -np.nan_to_num(error))
-    expected = expect_errors(arrivals, correction, np.ones(N, dtype=bool))
+    every = np.ones(N, dtype=bool)
+    expected = expect_errors(ErrorLaws.of(told, 1.0, correction, every), every)
     check = None
     if tolerance is not None:
         check = check_tolerance(expected, np.full(N, tolerance * 1e-3))

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.inverse_model import solve_again, solve_visits, std_errors
+from postproc.compensation.inverse_model import (
+    foresee,
+    predict_arrivals,
+    solve_again,
+    solve_visits,
+)
 from postproc.compensation.program import plan_visits, read_program, states_of
 from tests.written import FIRST, program
 
@@ -50,10 +55,16 @@ def test_standard_errors_are_those_of_the_sides_that_were_solved_for(solving):
     rows[3:7] = True
     aimed = states.with_(direction=direction)
     again = solve_again(first, rows, model, cell, planned, aimed)
-    found = std_errors(model, cell, states, again)
+    foreseen = foresee(model, cell, states, again)
+    found = foreseen.std_error
     known = ~np.isnan(planned.plan.q).any(axis=1)
     assert known.sum() == len(POINTS) + 1 and np.isnan(found[~known]).all()
     wanted = model.std_error(cell.arm, aimed[known])
     np.testing.assert_allclose(found[known], wanted, rtol=1e-9)
-    before = std_errors(model, cell, states, first)
+    told = predict_arrivals(model, cell, states, foreseen)
+    direct = model.predict(cell.arm, aimed[known])
+    for name in ("error", "std_model", "covariance"):
+        np.testing.assert_array_equal(getattr(told, name)[known], getattr(direct, name))
+    np.testing.assert_array_equal(told.any_outside[known], direct.any_outside)
+    before = foresee(model, cell, states, first).std_error
     assert np.abs(found - before)[6].max() > 1e-6

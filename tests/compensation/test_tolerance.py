@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import chi, ncx2
 
 from postproc.compensation.expected_error import (
+    ErrorLaws,
     LengthLaw,
     expect_errors,
     pool_bound,
@@ -17,6 +17,7 @@ from postproc.compensation.expected_error import (
 from postproc.compensation.tolerance import JobTolerance, Verdict, check_tolerance
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Meaning
+from postproc.model.model import Prediction
 from postproc.model.variance import covariance_of
 from tests.made_visits import visits as made_visits
 from tests.written import FIRST, NEXT, POSE, cli, program
@@ -24,18 +25,20 @@ from tests.written import FIRST, NEXT, POSE, cli, program
 STD = 0.02e-3
 
 
-def arrivals(error, std=STD, outside=0.0):
-    """Arrivals whose model predicts these errors (n, 3) [m]."""
+def predicted(error, std=STD, outside=False):
+    """What a model says that predicts these errors (n, 3) [m]."""
     error = np.asarray(error, dtype=float)
-    whole = np.full_like(error, outside)
-    found = np.stack([error, whole * 0.0 + std**2, whole * 0.0, whole], axis=1)
-    return SimpleNamespace(visits=[None] * len(error), predict=lambda rows: found)
+    covariance = np.zeros((len(error), 6))
+    covariance[:, :3] = std**2
+    beyond = {"beyond": np.full(len(error), outside)}
+    return Prediction(error, np.full_like(error, std), covariance, beyond)
 
 
 def check(error, correction, tolerance, **given):
     judged = np.ones(len(error), dtype=bool)
-    made = arrivals(error, **given)
-    found = expect_errors(made, np.asarray(correction, dtype=float), judged)
+    told = predicted(error, **given)
+    laws = ErrorLaws.of(told, 1.0, np.asarray(correction, dtype=float), judged)
+    found = expect_errors(laws, judged)
     return check_tolerance(found, np.full(len(error), tolerance * 1e-3))
 
 
@@ -103,9 +106,9 @@ def test_verdicts():
 
 def test_nothing_passes_outside_of_the_survey_or_without_a_prediction():
     error = np.array([[1e-3, 0, 0]])
-    assert check(error, -error, 0.1, outside=1.0).verdict[0] == Verdict.UNKNOWN
+    assert check(error, -error, 0.1, outside=True).verdict[0] == Verdict.UNKNOWN
     assert check(error, -error, 0.1, std=np.nan).verdict[0] == Verdict.UNKNOWN
-    assert check(error, 0 * error, 0.1, outside=1.0).verdict[0] == Verdict.FAIL
+    assert check(error, 0 * error, 0.1, outside=True).verdict[0] == Verdict.FAIL
 
 
 @pytest.fixture

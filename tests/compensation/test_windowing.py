@@ -18,6 +18,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import plan_visits, read_program
+from postproc.compensation.window_result import example_of
 from postproc.model.model import Model
 from postproc.report.json import report_text
 from tests.bench import made
@@ -52,13 +53,13 @@ def job(bench_cell, bench_model, monkeypatch):
 def joined(monkeypatch) -> list[int]:
     """Collect how many windows every program was put together from."""
     found: list[int] = []
-    original = pipeline.join_windows
+    original = pipeline.finish
 
-    def watched(parts):
+    def watched(whole, parts, ends):
         found.append(len(parts))
-        return original(parts)
+        return original(whole, parts, ends)
 
-    monkeypatch.setattr(pipeline, "join_windows", watched)
+    monkeypatch.setattr(pipeline, "finish", watched)
     return found
 
 
@@ -255,7 +256,8 @@ def test_where_a_window_begins_is_foretold_though_lines_tell_no_branch(
     reading = read_program(texts, bench_cell)
     setting = Job(bench_cell, bench_model, DEFAULT_OPTIONS, Clock(no_progress), 1)
     quiet = np.ones(len(reading.visits), dtype=bool)
-    work = pipeline._WindowWork(reading, setting, quiet, quiet)
+    room = example_of(6, turned=False)
+    work = pipeline._WindowWork(reading, setting, quiet, quiet, room)
     whole = plan_visits(reading.visits, bench_cell, False).plan.exact
     for visit in (120, 250):
         found = work._foretell(visit)

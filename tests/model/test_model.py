@@ -303,12 +303,12 @@ def test_states_beyond_the_survey_are_unsure_when_both_sides_are_known() -> None
     middle = np.median(p.std_model.max(axis=1))  # half of them beyond three times
     worst = middle / 3
     strict = replace(m, statistics={**m.statistics, "worst_std_mm": worst * 1e3})
-    std = strict.std_on_flanks(NJ, states)
+    std = strict.predict_on_flanks(NJ, states).std
     found = strict.unsure(std)
     np.testing.assert_array_equal(std, p.std_model)
     np.testing.assert_array_equal(found, p.std_model.max(axis=1) > middle)
     assert 0 < found.sum() < 30
     direction = np.array(states.direction)
     direction[found, 2] = 0.5
-    between = strict.std_on_flanks(NJ, states.with_(direction=direction))
+    between = strict.predict_on_flanks(NJ, states.with_(direction=direction)).std
     assert np.isnan(between[found]).all() and not strict.unsure(between).any()

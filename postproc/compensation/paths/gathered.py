@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.paths.changed_windows import Part
-from postproc.compensation.pipeline import (
-    BY_VISIT,
-    EXPLAINING,
-    WindowResult,
-    join_windows,
-)
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.rewrite import read_back
+from postproc.compensation.window_result import WindowResult, join_windows
 from postproc.language.text.number_edits import edits
 from postproc.motion.cycle_time import ProgramCycle
 
@@ -67,7 +62,7 @@ class Gathered:
             None where windows want other numbers of a literal that they share.
         """
         alone = [replace(part.kept, edits=()) for part in self.parts]
-        kept = take_visits(join_windows(alone), self.rows)
+        kept = join_windows(alone).take(self.rows)
         visits, values = reading.visits, kept.decisions.corrected
         written = self.column(
             lambda part: np.isin(part.visits.target.literal, part.kept.edited)
@@ -100,19 +95,3 @@ class Gathered:
             if not np.allclose(of(cycle), there, rtol=0.0, atol=ALIKE, equal_nan=True):
                 return False
         return True
-
-
-def take_visits(kept: WindowResult, rows: Ints) -> WindowResult:
-    """Keep what is told of some visits of a corrected program, in any order."""
-    moved = (np.cumsum(kept.corrected) - 1)[rows[kept.corrected[rows]]]
-    by_visit = len(kept.departure) == len(kept.corrected)
-    explained = len(kept.travel) > 0
-    return replace(
-        kept,
-        decisions=kept.decisions.part(rows),
-        before=kept.before[moved],
-        after=kept.after[moved],
-        departure=kept.departure[rows] if by_visit else kept.departure,
-        **{name: getattr(kept, name)[rows] for name in BY_VISIT},
-        **{name: getattr(kept, name)[rows] for name in EXPLAINING if explained},
-    )

@@ -58,9 +58,9 @@ from postproc.compensation.paths.path_error import apart
 from postproc.compensation.paths.prune import judge
 from postproc.compensation.paths.reapproach import insert_reapproaches
 from postproc.compensation.paths.split_selection import find_split
-from postproc.compensation.pipeline import CompensatedProgram, WindowResult
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.timing_comparison import run_in_time
+from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.language.languages import language_of
 
 FORETOLD = 4  # points in a part of a path before it is predicted with them

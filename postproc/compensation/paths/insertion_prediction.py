@@ -47,14 +47,11 @@ from postproc.compensation.paths.write_points import (
     insert,
     lines_in_files,
 )
-from postproc.compensation.pipeline import (
-    CompensatedProgram,
-    WindowResult,
-    correct,
-)
+from postproc.compensation.pipeline import correct
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.rewrite import Output
 from postproc.compensation.timing_comparison import InTime, run_in_time, run_visits
+from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.language.insert_moves import Splitter
 from postproc.language.visits import Visits
 from postproc.model.flank_hypotheses import FlankKind, FlankOfJoint, flanks_of

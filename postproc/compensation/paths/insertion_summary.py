@@ -9,7 +9,6 @@ import numpy as np
 from postproc.compensation.outcome import Status
 from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.fast_stops import predict_fast_stops
-from postproc.compensation.paths.gathered import take_visits
 from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,
     PathPrediction,
@@ -25,7 +24,7 @@ from postproc.compensation.paths.plan_outcomes import (
 )
 from postproc.compensation.paths.reapproach import find_reapproaches
 from postproc.compensation.paths.split_selection import can_stop
-from postproc.compensation.pipeline import CompensatedProgram
+from postproc.compensation.window_result import CompensatedProgram
 from postproc.robot.pose import MM
 
 PRELOAD = "Preload the backlash: compensation.preload_backlash"
@@ -51,7 +50,7 @@ def summarize(now: PathPrediction) -> CompensatedProgram:
     in_time = replace(
         now.in_time, before=now.task.first.before, inserted=_report_insertions(now)
     )
-    kept = take_visits(now.program.kept, now.own)
+    kept = now.program.kept.take(now.own)
     return replace(now.program, kept=kept, in_time=in_time)
 
 

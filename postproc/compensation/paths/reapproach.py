@@ -10,14 +10,13 @@ from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.approach_advice import place_to_approach
 from postproc.compensation.findings import SURE
 from postproc.compensation.outcome import Status
-from postproc.compensation.paths.gathered import take_visits
 from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,
     PathPrediction,
 )
 from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.write_points import numbers_at
-from postproc.compensation.pipeline import WindowResult
+from postproc.compensation.window_result import WindowResult
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -85,7 +84,7 @@ def _find_uncertain(kept: WindowResult) -> Bools:
 
 def bad_approaches(now: PathPrediction) -> set[int]:
     """Find the targets that are approached anew and are no better for it."""
-    kept = take_visits(now.program.kept, now.own)
+    kept = now.program.kept.take(now.own)
     unsure, status = _find_uncertain(kept), kept.decisions.status
     stops = now.program.kept.decisions.status[now.own - 1]
     others = np.flatnonzero(unsure & ~_find_uncertain(now.task.kept))
