@@ -33,7 +33,8 @@ FAR = "9000.0000, 0.0000, 0.0000, 0.0000, 180.0000, 0.0000"
 @pytest.fixture
 def job(bench_cell, bench_model, monkeypatch):
     def run(program: made.Made, least: int = LEAST, processes: int = 1) -> Outcome:
-        monkeypatch.setattr(cuts, "LEAST", least)
+        for name in ("LEAST", "MANY"):
+            monkeypatch.setattr(cuts, name, least)
         return compensate(
             program.source,
             bench_cell,
