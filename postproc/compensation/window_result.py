@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Indices, Interned, Ints, isin_sorted
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Indices,
+    Interned,
+    Ints,
+    any_in_rows,
+    isin_sorted,
+)
 from postproc.compensation.decisions import NONE, with_what_moves_along
 from postproc.compensation.eligibility import find_overruled
 from postproc.compensation.expected_error import ErrorLaws, LengthLaw
@@ -21,7 +29,7 @@ from postproc.compensation.program import ParsedProgram, PlannedProgram
 from postproc.diagnostics import NO_REASON
 from postproc.language.text.source import Replacements
 from postproc.language.visits import Visits
-from postproc.model.model import Model
+from postproc.model.model import Model, Prediction
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -257,8 +265,8 @@ def correction_of(
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
     wanted = plan.tcp[:, :3, 3] + planned.shift
     before, after = np.full((2, len(visits)), np.nan)
-    error = model.error(cell.arm, states[moved]) - planned.shift[moved]
-    before[moved] = np.linalg.norm(error, axis=1)
+    error = _errors_planned(states, decided, found.foreseen, moved, cell, model)
+    before[moved] = np.linalg.norm(error - planned.shift[moved], axis=1)
     error = done.tcp[moved, :3, 3] + model.error(cell.arm, new) - wanted[moved]
     after[moved] = np.linalg.norm(error, axis=1)
     judged = find_judged(visits, decided)
@@ -280,3 +288,24 @@ def correction_of(
         speed=plan.speed,
         departure=found.moved.sizes,
     )
+
+
+def _errors_planned(
+    states: States,
+    decided: Decisions,
+    foreseen: Prediction,
+    moved: Bools,
+    cell: Cell,
+    model: Model,
+) -> Floats:
+    """Return the errors at the k visits that move as they were planned, (k, 3) [m].
+
+    Most are foreseen: a target is corrected for the sides that were planned, but where
+    the correction changes them.
+    """
+    anew = np.array(moved)
+    if not model.evaluator(cell.arm).given:  # which may depend on the visit before
+        anew &= any_in_rows(states.direction != decided.side)
+    out = np.array(foreseen.error)
+    out[anew] = model.error(cell.arm, states[anew])
+    return out[moved]
