@@ -9,6 +9,7 @@ import secrets
 import signal
 import stat
 import threading
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -25,6 +26,7 @@ from postproc.operating_system import ENDING, set_mode, sync_folder
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
 NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
+AHEAD = 3  # pieces of a file that are made before they are written
 STREAM = "-"  # stands for standard input or output
 
 _PASSING = (stat.S_ISFIFO, stat.S_ISCHR)  # kinds that bytes pass through
@@ -226,12 +228,12 @@ def open_text(file: str | Path | bytes, name: str) -> Path | NamedText:
 
 
 def _ahead(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """Make every piece while the one before is written."""
+    """Make pieces while those before them are written: a few, so that none waits."""
     source = iter(pieces)
     with ThreadPoolExecutor(1) as pool:
-        coming = pool.submit(next, source, None)
-        while (piece := coming.result()) is not None:
-            coming = pool.submit(next, source, None)
+        coming = deque(pool.submit(next, source, None) for _ in range(AHEAD))
+        while (piece := coming.popleft().result()) is not None:
+            coming.append(pool.submit(next, source, None))
             yield piece
 
 

@@ -1,10 +1,12 @@
 //! Words of a text, in letters of any size: `postproc.batch.tree`, `.language.marks`.
 
+use std::ops::Range;
+
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::rows::{at_best, detached};
+use crate::rows::{at_best, detached, on_cores};
 
 /// Lines that are looked at between two looks at signals.
 const AT_ONCE: usize = 1 << 20;
@@ -46,8 +48,10 @@ fn begins(line: &[u8], words: &[Vec<u8>]) -> bool {
     words.iter().any(|word| begin(word).is_some_and(|b| b.eq_ignore_ascii_case(word)))
 }
 
-/// Bytes that are looked at between two looks at signals, and side by side.
+/// Bytes that are looked at between two looks at signals, that are worth a thread, and
+/// that are looked at side by side.
 const BYTES: usize = 1 << 26;
+const LARGE: usize = 1 << 22;
 const SIDE: usize = 64;
 
 /// Tell whether a text holds a word.
@@ -62,8 +66,12 @@ pub fn holds(py: Python<'_>, data: &Bound<'_, PyBytes>, word: &[u8]) -> PyResult
     };
     for first in (0..text.len()).step_by(BYTES) {
         py.check_signals()?;
-        let some = &text[first..text.len().min(first + BYTES + rest)];
-        if detached(py, || at_best(|| is_in(some, word)))? {
+        let places = first..text.len().min(first + BYTES);
+        let part = |own: Range<usize>| {
+            let some = &text[own.start..text.len().min(own.end + rest)];
+            at_best(|| is_in(some, word))
+        };
+        if detached(py, || on_cores(places, LARGE, part))?.contains(&true) {
             return Ok(true);
         }
     }
