@@ -368,19 +368,16 @@ impl Settling<'_> {
     fn gain(&self, i: usize) -> Gain {
         let s = &self.states;
         let (q, side, tool) = (&s.q[i], &s.side[i], s.tool(i));
-        let error = |side: &Six| {
-            let (load, given) = (s.load(i), s.given(i));
-            self.core.with_state((q, side), load, given, |state: &State<'_>| {
-                self.core.error(state, tool)
+        self.core.with_state((q, side), s.load(i), s.given(i), |state: &State<'_>| {
+            let error = |side: &Six| self.core.error(&State { side, ..*state }, tool);
+            let here = error(side);
+            std::array::from_fn(|j| {
+                let step = if side[j] > 0.0 { -STEP } else { STEP };
+                let mut other = *side;
+                other[j] += step;
+                let there = error(&other);
+                std::array::from_fn(|k| (here[k] - there[k]) / step)
             })
-        };
-        let here = error(side);
-        std::array::from_fn(|j| {
-            let step = if side[j] > 0.0 { -STEP } else { STEP };
-            let mut other = *side;
-            other[j] += step;
-            let there = error(&other);
-            std::array::from_fn(|k| (here[k] - there[k]) / step)
         })
     }
 
