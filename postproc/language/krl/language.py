@@ -79,7 +79,7 @@ class Krl(TaskLanguage):
         named = KrlFileName(str(program))
         if not named.is_program:
             return ()
-        return (*named.find_shared(listing), *acting_sources(program))
+        return (*named.find_shared(listing), *acting_sources(program, listing))
 
     def read_archive(self, folder: Path) -> language.Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""

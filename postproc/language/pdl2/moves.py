@@ -266,7 +266,6 @@ _FROM_HERE = frozenset(
     {Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
      Meaning.AWAY, Meaning.ABOUT, Meaning.BY, Meaning.FOR}
 )  # fmt: skip
-_VIA, _END = 0, 1
 
 
 def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
@@ -287,22 +286,21 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     reason = here.reason or reason
     predecessors = machine.predecessors(here)
     several = len(predecessors) > 1
+
+    def arrive(goal: Pdl2Goal, via: bool, fly: bool) -> int:
+        visit = Pdl2Visit(
+            here.place, motion, via, goal, settings, predecessors, reason,
+            at=here.row, fly=fly,
+        )  # fmt: skip
+        return machine.record(here, not via, visit)
+
     if statement.via is not None:
         goal = absolute(here, statement.via)
-        via = Pdl2Visit(
-            here.place, motion, True, goal, settings, predecessors, reason,
-            at=here.row, fly=True,
-        )  # fmt: skip
-        predecessors = frozenset({machine.record(here, _VIA, via)})
+        predecessors = frozenset({arrive(goal, True, True)})
         if machine.interrupted:  # the arm may have been moved off the way
             predecessors |= NOWHERE
     goal = goal_of(here, statement, motion)
-    end = Pdl2Visit(
-        here.place, motion, False, goal, settings, predecessors, reason,
-        at=here.row, fly=statement.fly,
-    )  # fmt: skip
-    arrived = machine.record(here, _END, end)
-    store.last = frozenset({arrived})
+    store.last = frozenset({arrive(goal, False, statement.fly)})
     if several and goal.target in _FROM_HERE:
         store.last |= NOWHERE
     if statement.til is not None or whose is None:
