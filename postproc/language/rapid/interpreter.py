@@ -175,7 +175,7 @@ class RapidMachine(TaskMachine):
             def read(operand: ir.Operand | None, row: int) -> str:
                 return errors.key_of(operand, self.task.number(operand, scope.at(row)))
 
-            clauses = errors.clauses_of(text, place.flow, read)
+            clauses = errors.HandlerReader(text, read).clauses(place.flow)
             rows = place.flow.handlers
             effects, called = self.read_rows(scope, rows, (errors.EXIT_CYCLE,))
             if moves := bool(effects.union(*map(self.routine_effects, called))):
