@@ -375,10 +375,15 @@ def find_beside(place: Path, name: str) -> Path | None:
 
 
 class FolderListing:
-    """What folders hold; each is read once, so that many programs of one are cheap."""
+    """What folders hold; each is read once, so that many programs of one are cheap.
 
-    def __init__(self) -> None:
+    Attributes:
+        root: A folder that nothing outside of is looked for, None for any place.
+    """
+
+    def __init__(self, root: Path | None = None) -> None:
         """Begin without any folder."""
+        self.root = root
         self._entries: dict[Path, tuple[Path, ...]] = {}
         self._named: dict[Path, dict[str, Path]] = {}
         self._below: dict[tuple[Path, tuple[str, ...]], tuple[Path, ...]] = {}

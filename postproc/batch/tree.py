@@ -75,7 +75,7 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
             continue
         folders[place.rpartition("/")[0]].append(place)
         sizes[place] = size
-    listing = FolderListing()
+    listing = FolderListing(root.absolute())
     found = [_sort(root, names, plan, listing) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
     # What a program reads and is not rewritten beside it: other tasks have programs.
@@ -171,8 +171,7 @@ def _sort(
 def _find_shared(root: Path, program: str, listing: FolderListing) -> tuple[str, ...]:
     """Return the places of what a program shares with others, and only reads."""
     root = root.absolute()
-    path = root / program
-    found = language_of(program).reads(path, root, listing)
+    found = language_of(program).reads(root / program, listing)
     inside = (one for one in found if root in one.parents)
     return tuple(one.relative_to(root).as_posix() for one in inside)
 

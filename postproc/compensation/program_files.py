@@ -23,6 +23,7 @@ from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import (
     STREAM,
+    FolderListing,
     base_name,
     is_stream,
     read_input,
@@ -74,7 +75,7 @@ def find_pages(program: Path) -> Pages:
         for name, line in outside.items()
     ]
     main = file_named(program).key
-    reads = language_of(program.name).reads(program)
+    reads = language_of(program.name).reads(program, FolderListing())
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]

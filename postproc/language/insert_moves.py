@@ -34,6 +34,8 @@ class MoveLayout(ABC):
         code: Its line, without the comment.
         indent: What begins the line.
         comment: What comments of its language begin with.
+        via: Where in the line the numbers of the point of an arc stand, None where they
+            stand elsewhere.
         longest: Characters that a line of the language may have.
     """
 
@@ -42,16 +44,8 @@ class MoveLayout(ABC):
     code: str
     indent: str
     comment: str
+    via: Span | None
     longest: int = field(default=LONGEST_LINE, kw_only=True)
-
-    @property
-    @abstractmethod
-    def via(self) -> Span:
-        """Return where in the line the numbers of the point of an arc stand.
-
-        Raises:
-            CloneError: They stand elsewhere.
-        """
 
     @abstractmethod
     def place(self, numbers: Floats, config: str) -> str:
@@ -219,6 +213,8 @@ class Splitter(ABC):
             CloneError: They cannot be written there.
         """
         layout, text = self.layout(file, line), ""
+        if layout.via is None:
+            raise CloneError("the point on its way does not stand in the move")
         begin, behind = layout.via
         old, new = layout.code[begin:behind], layout.place(via, config)
         for number, piece in enumerate(pieces):

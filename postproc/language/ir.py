@@ -262,6 +262,21 @@ class Instruction(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
+class ScopeHead(SourceStatement):
+    """``MODULE name(..)``, ``RECORD name``, ``DEFDAT name``: what declares data.
+
+    Attributes:
+        kind: module, record or defdat.
+        name: Its name.
+        attributes: Words behind it.
+    """
+
+    kind: str
+    name: str
+    attributes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class DeclaredItem(Node):
     """One name of a declaration.
 

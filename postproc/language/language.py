@@ -327,20 +327,10 @@ class Language(ABC):
         """Return what the archive of a controller gives, None for any other folder."""
         return None
 
-    def reads(
-        self,
-        program: Path,
-        within: Path | None = None,
-        listing: FolderListing | None = None,
-    ) -> tuple[Path, ...]:
+    def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
         """Return what a program reads of its archive, and other programs too.
 
         It is not rewritten.
-
-        Args:
-            program: The program.
-            within: A folder that no list outside of is looked for.
-            listing: What folders hold; default: they are read.
         """
         return ()
 

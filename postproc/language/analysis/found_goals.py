@@ -1,14 +1,19 @@
-"""Where a move goes, as an analysis finds it."""
+"""Where a move goes, and that the arm arrives there, as an analysis finds it."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Hashable
 from dataclasses import dataclass
+from typing import Any
 
+from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Reason
+from postproc.language.analysis.origins import Origins
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
+from postproc.robot.trajectory import Motion
 
 
 @dataclass(frozen=True)
@@ -148,3 +153,55 @@ def array_of(name: str) -> str:
     """
     array, *index = re.split(r"[{\[]", name, maxsplit=1)
     return array if index else ""
+
+
+@dataclass
+class FoundVisit:
+    """One arrival, as it is found.
+
+    Attributes:
+        scope: Where the move stands: its file and its row there.
+        motion, via: `Motion`, and whether it is the point of an arc.
+        goal: Where it goes.
+        modes: What holds there.
+        origins: Where it may come from.
+        why: Why it cannot be compensated.
+        arc_angle: As in `Visits` [rad].
+        block: Tells the curves apart that visits are points of, None for none.
+        curved: As in `Visits`.
+        count: How many moves it stands for that follow each other and differ only in
+            where they go: this one is the first.
+        points: What points hold where it was read.
+        left: With what the program went on behind it the last time: modes, points, and
+            where else the arm may come from.
+    """
+
+    scope: Any
+    motion: Motion
+    via: bool
+    goal: FoundGoal
+    modes: Any
+    origins: Origins = frozenset()
+    why: Reason = NO_REASON
+    arc_angle: float = math.nan
+    block: Hashable = None
+    curved: bool = False
+    count: int = 1
+    points: Any = None
+    left: tuple[Any, Any, Origins] | None = None
+
+    @property
+    def row(self) -> int:
+        """The row of the move in its file."""
+        row: int = self.scope.row
+        return row
+
+    @property
+    def rows(self) -> slice | Ints:
+        """The rows of all moves that it stands for."""
+        return slice(self.row, self.row + self.count)
+
+    @property
+    def is_run(self) -> bool:
+        """Whether it stands for more than itself."""
+        return self.count > 1

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
 from typing import Any, ClassVar, TypeVar
 
-from postproc.diagnostics import NO_REASON, Code, Reason
+from postproc.diagnostics import Code, Reason
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import (
-    NO_POINTS,
-    AssignedPoint,
-    Points,
-    Scope,
-)
+from postproc.language.analysis.assigned_points import AssignedPoint, Scope
 from postproc.language.analysis.found_goals import FoundGoal, FoundShift, hold_numbers
-from postproc.language.analysis.origins import Origins
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import Shift
 from postproc.language.visits import Meaning
-from postproc.robot.trajectory import Motion
 
 MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
 RUN_TIME = "it is known only when the program runs"
@@ -366,44 +359,3 @@ def list_slots(numbers: Sequence[WrittenNumber], width: int) -> tuple[int, ...]:
     if min(slots, default=-1) < 0:
         return (-1,) * width
     return slots + (-1,) * (width - len(slots))
-
-
-@dataclass
-class FoundVisit:
-    """One arrival, as it is found.
-
-    Attributes:
-        scope: Where the move stands.
-        motion, via: `Motion`, and whether it is the point of an arc.
-        goal: Where it goes.
-        modes: What holds there.
-        origins: Where it may come from.
-        why: Why it cannot be compensated.
-        arc_angle: As in `Visits` [rad].
-        block: Tells the curves apart that visits are points of, None for none.
-        curved: As in `Visits`.
-        count: How many moves it stands for that follow each other and differ only in
-            where they go: this one is the first.
-        points: What points hold where it was read.
-        left: With what the program went on behind it the last time: modes, points, and
-            where else the arm may come from.
-    """
-
-    scope: Scope
-    motion: Motion
-    via: bool
-    goal: FoundGoal
-    modes: Any
-    origins: Origins = frozenset()
-    why: Reason = NO_REASON
-    arc_angle: float = math.nan
-    block: Hashable = None
-    curved: bool = False
-    count: int = 1
-    points: Points = NO_POINTS
-    left: tuple[Any, Any, Origins] | None = None
-
-    @property
-    def row(self) -> int:
-        """The row of the move in its file."""
-        return self.scope.row

@@ -1,4 +1,4 @@
-"""From the arrivals that a `TaskMachine` has found to `Visits`."""
+"""From the arrivals that a machine has found to `Visits`."""
 
 from __future__ import annotations
 
@@ -21,13 +21,17 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from postproc.arrays import Floats, Indices, Ints
+from postproc.arrays import Indices, Ints, release_memory
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import visits
 from postproc.language.analysis.call_context import Point
 from postproc.language.analysis.conditions import Conditions, Zone
-from postproc.language.analysis.found_goals import FoundGoal, array_of, whole_name
-from postproc.language.analysis.goals import FoundVisit
+from postproc.language.analysis.found_goals import (
+    FoundGoal,
+    FoundVisit,
+    array_of,
+    whole_name,
+)
 from postproc.language.analysis.move_runs import within
 from postproc.language.analysis.origins import Origins, number_origins
 from postproc.language.analysis.task_machine import TaskMachine
@@ -40,7 +44,7 @@ from postproc.language.analysis.visit_columns import (
     to_visits,
 )
 from postproc.language.pose_encoding import Dialect
-from postproc.language.text.comment_directives import MEASURE
+from postproc.language.text.comment_directives import MEASURE, Comments
 from postproc.language.text.statement_table import StatementText
 
 ONLY_SHIFTED = Reason(
@@ -57,11 +61,13 @@ class Arrival:
         conditions: What it is carried out with.
         reasons: Why it cannot be compensated; `NO_REASON` does not count.
         flagged: It has configuration flags.
+        flies: The arm passes it without stopping.
     """
 
     conditions: Conditions
     reasons: Sequence[Reason]
     flagged: bool
+    flies: bool
 
 
 def zone_at(
@@ -108,16 +114,23 @@ BESIDE = (
 )
 
 
-class Collector:
-    """Sorts what a machine has found, r, in the order of the program: n visits.
+class Collector(ABC):
+    """Makes visits of what a machine has found, r, in the order of the program: n.
 
     Attributes:
+        dialect: What the numbers mean.
+        comments: How the language writes them.
         machine: It has followed all ways.
         numbering: The numbers of all files.
         found: What it has found.
         counts, begin: How many visits each stands for, and the first of them, (r,).
         last: The last of them, by the number that the machine knows it by, (r,).
+        owner, inside: Whose a visit is, and its place there, (n,).
+        columns: The visits.
     """
+
+    dialect: ClassVar[Dialect]
+    comments: ClassVar[Comments]
 
     def __init__(self, machine: Any, numbering: Numbering) -> None:
         """Sort what was found."""
@@ -129,21 +142,158 @@ class Collector:
         self.begin = np.cumsum(self.counts) - self.counts
         self.last = np.empty(len(order), np.int64)
         self.last[order] = self.begin + self.counts - 1
+        self.owner, self.inside = within(self.counts)
+
+    # What a language says.
+
+    @abstractmethod
+    def arrive(self, v: Any) -> Arrival:
+        """Say what an arrival is carried out with."""
+
+    @abstractmethod
+    def list_moves(self) -> Sequence[Indices]:
+        """Return the rows of the moves of every file that is followed."""
+
+    @abstractmethod
+    def fill_run(self, v: Any, rows: slice) -> None:
+        """Fill the columns of moves that stand for more than the first of them.
+
+        Args:
+            v: The first of them.
+            rows: Their visits; what is said of an arrival has been filled.
+        """
+
+    @abstractmethod
+    def find_uses(self, literal: Indices) -> tuple[dict[int, str], Indices]:
+        """Find what else depends on literals.
+
+        Args:
+            literal: Literal of every visit, (n,), -1 where it has none.
+
+        Returns:
+            Why literals must stay, and for every visit the literal that it moves along
+            with, (n,), -1 where there is none.
+        """
 
     def origins_of(self, one: Any) -> Origins:
         """Return where the arm may come from before what was found."""
         found: Origins = one.origins
         return found
 
+    def count_axes(self) -> int:
+        """Return the last auxiliary axis that targets give a value of."""
+        aux = np.array([v.goal.aux for v in self.found], float)
+        used = ~np.isnan(aux).all(axis=0) if len(aux) else []
+        return int(np.flatnonzero(used).max(initial=-1)) + 1
+
+    # What follows from that.
+
+    def collect(self) -> visits.Visits:
+        """Put the arrivals into columns."""
+        numbers, n = len(self.numbering), len(self.owner)
+        self.columns = c = VisitColumns(
+            n, self.dialect.width, self.count_axes(), numbers
+        )
+        self._fill_places()
+        self.fill_goals(self.begin, [v.goal for v in self.found])
+        self._fill_conditions()
+        for v, begin in zip(self.found, self.begin.tolist(), strict=True):
+            if v.is_run:
+                self.fill_run(v, slice(begin, begin + v.count))
+        self.complete()
+        self._mark_pauses()
+        if self.machine.exhausted:
+            c.reason[:] = c.reasons[TOO_COMPLEX]
+        c.names.settle()
+        release_memory(n)
+        literals, literal = find_literals(c, self.numbering)
+        pinned, follows = self.find_uses(literal)
+        if pinned:
+            texts = visits.texts_of(len(literals), pinned)
+            literals = replace(literals, pinned=texts)
+        c.slots = c.slots[:0].copy()  # the others need the room
+        own = self.numbering.names, self.graph(), literals, literal, follows
+        return to_visits(c, *own, self.dialect)
+
+    def complete(self) -> None:
+        """Fill what only this language says, and which moves are measured."""
+        self.columns.measured = self._read_measure_ids()
+
+    def spread(self, own: Iterable[Any], dtype: DTypeLike) -> NDArray[Any]:
+        """Return what is said of what was found, for every visit, (n,)."""
+        return np.array([*own], dtype)[self.owner]
+
+    def _fill_places(self) -> None:
+        """Fill where moves stand, and how they move."""
+        c, found = self.columns, self.found
+        c.file[:] = self.spread((v.scope.file for v in found), np.int64)
+        row = self.spread((v.row for v in found), np.int32) + self.inside
+        for number, text in enumerate(self.numbering.texts):
+            mine = c.file == number
+            c.line[mine] = text.begin_line[row[mine]]
+        c.kind[:] = self.spread((v.motion for v in found), np.int64)
+        c.via[:] = self.spread((v.via for v in found), bool)
+
+    def fill_goals(self, visit: Ints, goals: Sequence[Any]) -> None:
+        """Fill where some moves go, each for itself.
+
+        Args:
+            visit: Their visits, (k,).
+            goals: Where they go, k.
+        """
+        c = self.columns
+        if not len(visit):
+            return
+        c.meaning[visit] = [goal.target for goal in goals]
+        c.values[visit] = np.array([goal.values for goal in goals], float)
+        c.name[visit] = c.names.of([goal.name for goal in goals])
+        c.aux[visit] = np.array([goal.aux for goal in goals])[:, : c.aux.shape[1]]
+        c.shared[visit] = [g.shared and not g.is_rewritten_by_shift for g in goals]
+        written = [k for k, goal in enumerate(goals) if goal.writes[0] >= 0]
+        if written:
+            c.slots[visit[written]] = [goals[k].writes for k in written]
+
+    def fill_numbers(
+        self, visit: Ints | slice, slots: Iterable[tuple[int, Ints]], file: int
+    ) -> None:
+        """Fill numbers that stand in moves, and where; column by column: short of room.
+
+        Args:
+            visit: The visits, k.
+            slots: Columns of targets, and the numbers of all files there, (k,).
+            file: The file of the moves.
+        """
+        c, value = self.columns, self.numbering.texts[file].value
+        for column, own in slots:
+            c.slots[visit, column] = own
+            c.values[visit, column] = value[own - self.numbering.first[file]]
+
+    def _fill_conditions(self) -> None:
+        """Fill what moves are carried out with, and why they must stay."""
+        c, arrivals = self.columns, [self.arrive(v) for v in self.found]
+        conditions = [one.conditions for one in arrivals]
+        c.condition[:] = c.conditions.of(conditions)[self.owner]
+        c.fly[:] = self.spread((one.flies for one in arrivals), bool)
+        c.config_given[:] = self.spread((one.flagged for one in arrivals), bool)
+        reasons = [next(filter(None, one.reasons), NO_REASON) for one in arrivals]
+        c.reason[:] = c.reasons.of(reasons)[self.owner]
+
+    def _mark_pauses(self) -> None:
+        """Say of which fly points it is not known whether the arm stops there."""
+        c = self.columns
+        rows = self.last[[*self.machine.find_unsure_stops()]]
+        rows, conditions = rows[c.fly[rows]], [*c.conditions]
+        for number in np.unique(c.condition[rows]).tolist():
+            one, mine = conditions[number], rows[c.condition[rows] == number]
+            if not (one.zone.rule == visits.ZoneRule.PASS or one.zone.size_mm < 0.0):
+                zone = replace(one.zone, rule=visits.ZoneRule.UNKNOWN)
+                c.condition[mine] = c.conditions[replace(one, zone=zone)]
+
     def graph(self) -> visits.Graph:
         """Translate origins to visits in the order of the program."""
         every = map(self.origins_of, self.found)
         origins = [number_origins(one, self.last) for one in every]
         return chain_visits(self.counts, origins)
-
-    def rows_of(self, one: Any) -> tuple[int, slice | Ints]:
-        """Return the file of what was found, and the rows of its moves there."""
-        return one.scope.file, slice(one.row, one.row + one.count)
 
     def find_unreached(self, moves: Iterable[Indices]) -> dict[str, Ints]:
         """Return the lines of moves that no way leads to, ascending, by file.
@@ -155,13 +305,29 @@ class Collector:
         missed = [np.zeros(len(text), bool) for text in texts]
         for own, rows in zip(missed, moves, strict=False):
             own[rows] = True
-        for file, visited in map(self.rows_of, self.found):
-            missed[file][visited] = False
+        for v in self.found:
+            missed[v.scope.file][v.rows] = False
         lines = (
             np.unique(t.begin_line[own]) for t, own in zip(texts, missed, strict=True)
         )
         found = zip(self.numbering.names, lines, strict=True)
         return {name: own.astype(np.int64) for name, own in found if len(own)}
+
+    def _read_measure_ids(self) -> dict[int, str]:
+        """Return the ids that comments give to visits."""
+        ids = list[dict[int, str]]()
+        for text, rows in zip(self.numbering.texts, self.list_moves(), strict=False):
+            marks = [*self.comments.marks(text.source, MEASURE)]
+            ids.append(
+                find_measured(marks, text.end_line[rows] if marks else rows, rows)
+            )
+        found = dict[int, str]()
+        for v, begin in zip(self.found if any(ids) else (), self.begin, strict=False):
+            own = {} if v.via else ids[v.scope.file]
+            rows = np.arange(len(self.numbering.texts[v.scope.file]))[v.rows]
+            for k in np.flatnonzero(np.isin(rows, [*own])).tolist():
+                found[int(begin) + k] = own[int(rows[k])]
+        return found
 
 
 def find_measured(
@@ -182,147 +348,66 @@ def find_measured(
     return found
 
 
-class TaskCollector(Collector, ABC):
-    """Makes visits of what the machine of a task has found.
+class TaskCollector(Collector):
+    """Makes visits of what the machine of a task has found."""
 
-    Attributes:
-        dialect: What the numbers mean.
-    """
-
-    dialect: ClassVar[Dialect]
     machine: TaskMachine
     found: list[FoundVisit]
 
     def __init__(self, machine: Any) -> None:
         """Find what counts for several: it is filled for all of them."""
         super().__init__(machine, machine.task.numbering)
-        self.owner, self.inside = within(self.counts)  # of each visit: (n,)
         first = dict[int, int]()  # by the numbers that moves write
         for k, v in enumerate(self.found):
             if v.goal.writes[0] >= 0:
                 first.setdefault(v.goal.writes[0], k)
         self.index = {place: k for k, place in enumerate(first)}
         self.example = [*first.values()]
+        self.followed = self._find_followed()
 
-    @abstractmethod
-    def arrive(self, v: Any) -> Arrival:
-        """Say what an arrival is carried out with."""
+    def list_moves(self) -> Sequence[Indices]:
+        """Return the moves of the files of the task."""
+        return [file.moves for file in self.machine.task.files]
 
-    def collect(self) -> visits.Visits:
-        """Put the arrivals into columns."""
-        machine, followed = self.machine, self._find_followed()
-        self._fill()
-        self._fill_numbers()
-        self._fill_conditions([self.arrive(v) for v in self.found], followed)
-        c = self.columns
-        c.taught = np.array(self._find_taught(), bool)[self.owner]
-        c.measured = self._read_measure_ids()
-        literals, literal = find_literals(c, self.numbering)
-        c.slots = c.slots[:0].copy()  # the others need the room
-        first = self.begin[np.array(self.example, np.int64)]
-        own = np.append(literal[first], -1)  # each one's first
-        pinned = self._find_pinned([*_goals_beside(machine)])
-        self._hold_for_taught(pinned)
-        return to_visits(
-            c, self.numbering.names, self.graph(),
-            self._pin(literals, literal, pinned), literal,
-            own[np.maximum(followed, -1)][self.owner], self.dialect,
+    def fill_run(self, v: FoundVisit, rows: slice) -> None:
+        """Fill moves that differ in their numbers alone, see `Collector.fill_run`."""
+        c, text = self.columns, self.machine.texts[v.scope.file]
+        for column in (c.meaning, c.values, c.slots, c.name, c.aux, c.shared):
+            column[rows] = column[rows.start]
+        stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
+        own, steps = v.goal.writes, stride * np.arange(v.count)
+        places = ((at, slot + steps) for at, slot in enumerate(own) if slot >= 0)
+        self.fill_numbers(rows, places, v.scope.file)
+
+    def complete(self) -> None:
+        """Fill splines, shifts and taught points, see `Collector.complete`."""
+        super().complete()
+        c, found = self.columns, self.found
+        c.arc_angle = self.spread((v.arc_angle for v in found), float)
+        c.block = np.append(self.begin, -1)[_blocks(found)].astype(np.int32)[self.owner]
+        c.curved = self.spread((v.curved for v in found), bool)
+        posed = (
+            v.goal.shift if v.goal.target == visits.Meaning.POSE else None
+            for v in found
         )  # fmt: skip
-
-    def _spread(self, own: Iterable[Any], dtype: DTypeLike) -> NDArray[Any]:
-        """Return what is said of what was found, for every visit, (n, ..)."""
-        return np.array([*own], dtype)[self.owner]
-
-    def _fill(self) -> None:
-        """Fill where moves stand and where they go."""
-        found, owner, aux = self.found, self.owner, _aux(self.found)
-        numbers = len(self.numbering)
-        c = VisitColumns(len(owner), self.dialect.width, aux.shape[1], numbers)
-        self.columns = c
-        c.file[:] = self._spread((v.scope.file for v in found), np.int64)
-        row = self._spread((v.row for v in found), np.int32) + self.inside
-        for number, text in enumerate(self.machine.texts):
-            mine = c.file == number
-            c.line[mine] = text.begin_line[row[mine]]
-        c.kind[:] = self._spread((v.motion for v in found), np.int64)
-        c.meaning[:] = self._spread((v.goal.target for v in found), np.int64)
-        c.via[:] = self._spread((v.via for v in found), bool)
-        c.arc_angle = self._spread((v.arc_angle for v in found), float)
-        c.block = np.append(self.begin, -1)[_blocks(found)].astype(np.int32)[owner]
-        c.curved = self._spread((v.curved for v in found), bool)
-        c.aux[:] = aux[owner]
-        c.name[:] = c.names.of([v.goal.name for v in found])[owner]
-        goals, pose = [v.goal for v in found], visits.Meaning.POSE
-        posed = (goal.shift if goal.target == pose else None for goal in goals)
         own = (-1 if one is None else c.shifts[one.shift] for one in posed)
-        c.shift = self._spread(own, np.int64)
-        shared = (one.shared and not one.is_rewritten_by_shift for one in goals)
-        c.shared[:] = self._spread(shared, bool)
-        if len(owner):
-            c.values[:] = self._spread((v.goal.values for v in found), float)
+        c.shift = self.spread(own, np.int64)
+        lost = (self.followed == _NO_LITERAL)[self.owner] & (c.reason == 0)
+        if lost.any():
+            c.reason[lost] = c.reasons[ONLY_SHIFTED]
+        c.taught = self.spread(self._find_taught(), bool)
 
-    def _fill_numbers(self) -> None:
-        """Fill which numbers are those of a target; of runs also what they are."""
-        c = self.columns
-        for k, v in enumerate(self.found):
-            own = np.array(v.goal.writes)
-            if own[0] < 0:
-                continue
-            rows = slice(self.begin[k], self.begin[k] + v.count)
-            is_written = own >= 0
-            if v.count == 1:
-                c.slots[rows.start, is_written] = own[is_written]
-                continue
-            text = self.machine.texts[v.scope.file]
-            base = self.numbering.first[v.scope.file]
-            stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
-            steps = stride * np.arange(v.count)
-            for at in np.flatnonzero(is_written).tolist():  # one by one: short of room
-                places = own[at] + steps
-                c.slots[rows, at] = places
-                c.values[rows, at] = text.value[places - base]
-
-    def _fill_conditions(self, arrivals: Sequence[Arrival], followed: Ints) -> None:
-        """Fill what moves are carried out with, and why they must stay."""
-        c, owner = self.columns, self.owner
-        c.condition[:] = c.conditions.of([one.conditions for one in arrivals])[owner]
-        flies = (one.conditions.zone.blend != visits.Blend.UNSET for one in arrivals)
-        c.fly[:] = self._spread(flies, bool)
-        c.config_given[:] = self._spread((one.flagged for one in arrivals), bool)
-        reasons = [
-            TOO_COMPLEX
-            if self.machine.exhausted
-            else next(filter(None, one.reasons), NO_REASON)
-            for one in arrivals
-        ]
-        for k in np.flatnonzero(followed == _NO_LITERAL).tolist():
-            reasons[k] = reasons[k] or ONLY_SHIFTED
-        c.reason[:] = c.reasons.of(reasons)[owner]
-
-    def _read_measure_ids(self) -> dict[int, str]:
-        """Return the ids that comments give to visits."""
-        ids, task = list[dict[int, str]](), self.machine.task
-        for file in task.files:
-            text, rows = file.text, file.moves
-            marks = [*task.comments.marks(text.source, MEASURE)]
-            last = text.source.lines_of(text.end[rows]) if marks else rows
-            ids.append(find_measured(marks, last, rows))
-        if not any(ids):
-            return {}
-        each = ((v, k) for v in self.found for k in range(v.count))
-        own = ("" if v.via else ids[v.scope.file].get(v.row + k, "") for v, k in each)
-        return {visit: mark for visit, mark in enumerate(own) if mark}
-
-    def _pin(
-        self, literals: visits.Literals, literal: Indices, pinned: Sequence[str]
-    ) -> visits.Literals:
-        """Say of literals why they must stay; what pins a first one pins its run."""
+    def find_uses(self, literal: Indices) -> tuple[dict[int, str], Indices]:
+        """Find it by the first of each run: what pins that one pins its run."""
+        pinned = self._find_pinned([*_goals_beside(self.machine)])
+        self._hold_for_taught(pinned)
         texts = dict[int, str]()
         for k, why in zip(self.example, pinned, strict=True):
             if why:
                 own = literal[self.begin[k] : self.begin[k] + self.counts[k]]
                 texts |= dict.fromkeys(own[own >= 0].tolist(), why)
-        return replace(literals, pinned=visits.texts_of(len(literals), texts))
+        own = np.append(literal[self.begin[np.array(self.example, np.int64)]], -1)
+        return texts, own[np.maximum(self.followed, -1)][self.owner]
 
     def _find_followed(self) -> Ints:
         """Find what computed targets move along with, (r,), -1 for none.
@@ -408,13 +493,6 @@ def _blocks(found: Sequence[FoundVisit]) -> Ints:
     own = [-1 if v.block is None else first.setdefault(v.block, k)
            for k, v in enumerate(found)]  # fmt: skip
     return np.array(own, np.int64)
-
-
-def _aux(found: Sequence[FoundVisit]) -> Floats:
-    """External axes that have a value, (n, k): up to the last that is used."""
-    aux = np.array([v.goal.aux for v in found], float).reshape(len(found), 6)
-    used = np.flatnonzero(~np.isnan(aux).all(axis=0))
-    return aux[:, : int(used.max(initial=-1)) + 1]
 
 
 def _find_uncertain(names: set[str], copies: Set[tuple[str, str]]) -> Mapping[str, str]:

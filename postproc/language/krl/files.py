@@ -90,22 +90,16 @@ class KrlFileName(FileName):
                 found[called] = text.count(b"\n", 0, call.start()) + 1
         return found | _name_lists(Path(self.place), text), {}
 
-    def find_shared(
-        self, within: Path | None = None, listing: FolderListing | None = None
-    ) -> tuple[Path, ...]:
+    def find_shared(self, listing: FolderListing) -> tuple[Path, ...]:
         """Find what a source shares with others: ``$config.dat``, and submit programs.
 
         Submit programs stand beside either, or anywhere in the archive that the list
         belongs to; they may change what programs read.
-
-        Args:
-            within: A folder that nothing outside of is looked at.
-            listing: What folders hold; default: they are read.
         """
-        folder, listing = Path(self.place).absolute().parent, listing or FolderListing()
+        folder = Path(self.place).absolute().parent
         if not self.is_program or not folder.is_dir():
             return ()
-        found = _find_shared_list(folder, within, listing)
+        found = _find_shared_list(folder, listing)
         submits: list[Path] = []
         if found is not None and found.parent.name.lower() == "system":
             submits += listing.ending(found.parent.parent, self.background, below=True)
@@ -130,9 +124,7 @@ def _find_calls(text: bytes) -> Iterator[re.Match[bytes]]:
         at = text.find(b"(", end)
 
 
-def _find_shared_list(
-    folder: Path, within: Path | None, listing: FolderListing
-) -> Path | None:
+def _find_shared_list(folder: Path, listing: FolderListing) -> Path | None:
     """Find ``$config.dat``: beside a source, or where a controller keeps it.
 
     In an archive programs stand in ``R1/Program``, at any depth, and the list in
@@ -140,7 +132,7 @@ def _find_shared_list(
     """
     found = listing.named(folder, SHARED_LIST)
     for above in list(folder.parents)[:ARCHIVE_DEPTH]:
-        outside = within is not None and within not in (above, *above.parents)
+        outside = listing.root and listing.root not in (above, *above.parents)
         if found is not None or outside:
             break
         found = listing.named(above / "System", SHARED_LIST)

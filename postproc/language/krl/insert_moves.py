@@ -15,7 +15,7 @@ from postproc.language.krl import syntax as said
 from postproc.language.krl.clones import is_of_form
 from postproc.language.krl.modal_state import PLANNED
 from postproc.language.krl.pose_encoding import COMPONENTS, KRL_DIALECT
-from postproc.language.text.source import CloneError, Source, Span
+from postproc.language.text.source import Source
 
 LINES = {"lin": "LIN", "circ": "LIN", "slin": "SLIN", "scirc": "SLIN"}
 _BLENDING = re.compile(r"(?:\s*\bC_\w+)+\s*$", re.I)
@@ -117,7 +117,8 @@ class KrlSplitter(TaskSplitter):
         first, *_ = insert_moves.split_arguments(code, head.end(), behind)
         settings = code[with_.end() : stop].strip() if with_ else ""
         indent, word = code[: head.start(1)], head[1].lower()
-        return KrlLayout(source, start, code, indent, ";", word, first, settings)
+        via = first if code[first.start] == "{" else None
+        return KrlLayout(source, start, code, indent, ";", via, word, settings)
 
 
 SPLITTER = KrlSplitter
@@ -129,20 +130,11 @@ class KrlLayout(insert_moves.MoveLayout):
 
     Attributes:
         word: Of the move, in lower case.
-        first: Where its first place stands in the line.
         settings: What holds for the move alone, as it is written.
     """
 
     word: str
-    first: Span
     settings: str
-
-    @property
-    def via(self) -> Span:
-        """Return where the point of an arc stands, see `MoveLayout.via`."""
-        if self.code[self.first.start] != "{":
-            raise CloneError("the point on its way does not stand in the move")
-        return self.first
 
     def place(self, numbers: Floats, config: str) -> str:
         """Write a position, its numbers (8,); lines and arcs ignore S and T."""

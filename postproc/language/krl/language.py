@@ -74,17 +74,12 @@ class Krl(TaskLanguage):
         _refuse_own_accuracy(files)
         _refuse_doubles(files)
 
-    def reads(
-        self,
-        program: Path,
-        within: Path | None = None,
-        listing: FolderListing | None = None,
-    ) -> tuple[Path, ...]:
+    def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
         """Return what all share, and sources of packages that people wrote moves in."""
         named = KrlFileName(str(program))
         if not named.is_program:
             return ()
-        return (*named.find_shared(within, listing), *acting_sources(program))
+        return (*named.find_shared(listing), *acting_sources(program, listing))
 
     def read_archive(self, folder: Path) -> language.Archive | None:
         """Read ``$config.dat`` and ``$machine.dat`` of an archive."""

@@ -15,7 +15,12 @@ from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import NO_POINTS, AssignedPoint, Scope
 from postproc.language.analysis.conditions import TaskFrame
-from postproc.language.analysis.found_goals import FoundGoal, hold_numbers, not_reached
+from postproc.language.analysis.found_goals import (
+    FoundGoal,
+    FoundVisit,
+    hold_numbers,
+    not_reached,
+)
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
@@ -76,7 +81,7 @@ ANGLE = Reason(
 
 
 @dataclass
-class KrlVisit(goals.FoundVisit):
+class KrlVisit(FoundVisit):
     """One arrival, as it is found.
 
     Attributes:

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from postproc import _native
 from postproc.files import base_name
 from postproc.language import ir
@@ -77,8 +75,6 @@ def read_krl(source: Source) -> KrlFile:
     moves = text.of_kind(lambda one: isinstance(one, said.KrlMove))
     for row in text.of_kind(lambda one: not isinstance(one, said.KrlMove)):
         match one := text.statement(row):
-            case said.DataList():
-                outline.begin("defdat", row, one)
             case said.SplineBlock(word="endspline"):
                 outline.word("endspline", row)
                 splines += [range(begin, row)] if begin >= 0 else []
@@ -94,14 +90,12 @@ def read_krl(source: Source) -> KrlFile:
             case _:
                 outline.take(row, one, name)
     outline.close()
-    routines = outline.of(*_ROUTINES)
-    if routines:  # other files know the first one of a file
-        head = replace(routines[0].head, local=False)
-        routines[0] = replace(routines[0], head=head)
-    return KrlFile(
-        text, tuple(routines), tuple(outline.data), np.array(moves, dtype=np.int32),
-        tuple(sorted({*outline.diagnostics})), name, tuple(splines),
-    )  # fmt: skip
+    found = KrlFile(**outline.parts(moves), name=name, splines=tuple(splines))
+    if not found.routines:
+        return found
+    first, *others = found.routines  # other files know the first one of a file
+    first = replace(first, head=replace(first.head, local=False))
+    return replace(found, routines=(first, *others))
 
 
 def _index(

@@ -36,23 +36,6 @@ class KrlAggregate(Operand):
 
 
 @dataclass(frozen=True, slots=True)
-class AccessHeader(SourceStatement):
-    """``&ACCESS RVP`` and the like."""
-
-
-@dataclass(frozen=True, slots=True)
-class DataList(SourceStatement):
-    """``DEFDAT name PUBLIC``."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class OutsideName(SourceStatement):
-    """``EXT``, ``SIGNAL``, ``ENUM``, ``STRUC``, ..: names, and nothing that runs."""
-
-
-@dataclass(frozen=True, slots=True)
 class Waiting(SourceStatement):
     """``WAIT SEC t``, ``WAIT FOR x``, ``HALT``: the arm stands still until then."""
 
@@ -62,11 +45,6 @@ class Waiting(SourceStatement):
 @dataclass(frozen=True, slots=True)
 class ContinueWord(SourceStatement):
     """``CONTINUE``: the next statement does not stop what is planned ahead."""
-
-
-@dataclass(frozen=True, slots=True)
-class SpeedPart(SourceStatement):
-    """``TIME_BLOCK START``, ``CONST_VEL END = -50``: how fast a spline is run there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,10 @@ from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.krl import modal_state
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
-from postproc.language.krl.pose_encoding import KRL_DIALECT
+from postproc.language.krl.pose_encoding import COMMENTS, KRL_DIALECT
 from postproc.language.krl.syntax import SplineBlock
 from postproc.language.shifts import Pose
-from postproc.language.visits import Meaning, OrientationLaw, Switch
+from postproc.language.visits import Blend, Meaning, OrientationLaw, Switch
 from postproc.robot.trajectory import Motion
 
 STOP, PASS, MAYBE = "stop", "pass", "maybe"
@@ -52,7 +52,7 @@ _NOT_SET = "an inline setting (WITH) is not known"
 class KrlCollector(to_visits.TaskCollector):
     """Makes the visits of a KRL job."""
 
-    dialect = KRL_DIALECT
+    dialect, comments = KRL_DIALECT, COMMENTS
 
     def __init__(self, machine: KrlMachine) -> None:
         """Find what ways to other arrivals tell of each."""
@@ -98,7 +98,9 @@ class KrlCollector(to_visits.TaskCollector):
             override=modes.share if joint and modes.share > 0.0 else 1.0,
             load=_load(modes),
         )
-        return Arrival(conditions, given, joint and v.goal.target == Meaning.POSE)
+        flies = conditions.zone.blend != Blend.UNSET
+        flagged = joint and v.goal.target == Meaning.POSE
+        return Arrival(conditions, given, flagged, flies)
 
 
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[modal_state.KrlModes, Reason]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
-from postproc.files import read_input
+from postproc.files import FolderListing, read_input
 from postproc.language.krl.files import ARCHIVE_DEPTH, KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import read_krl
@@ -19,35 +18,19 @@ FOLDERS = ("System", "TP", "Program")  # of an archive
 READ_BEFORE = 64  # sources of which is known what they do
 
 
-def acting_sources(program: Path) -> tuple[Path, ...]:
+def acting_sources(program: Path, listing: FolderListing) -> tuple[Path, ...]:
     """Return sources of packages that move the arm, or set what moves need.
 
     The list of routines that are known to be still does not hold for them. They stand
     beside a program, or in its archive; they are read and never rewritten.
-
-    Args:
-        program: The source that runs.
     """
     own = program.absolute()
-    places = (place for place in _places(own) if place != own)
-    found = {place.name.lower(): place for place in places if _acts(place)}
-    return tuple(found.values())
-
-
-def _places(program: Path) -> Iterator[Path]:
-    """Yield where such sources stand, the nearest last."""
-    above = [*program.parents][: 1 + ARCHIVE_DEPTH]
+    above = [*own.parents][: 1 + ARCHIVE_DEPTH]
     roots = [folder for folder in above if (folder / "System").is_dir()][:1]
-    for place in (root / name for root in roots for name in FOLDERS):
-        yield from _spelt_in(place)
-    yield from _spelt_in(program.parent)
-
-
-def _spelt_in(folder: Path) -> Iterator[Path]:
-    """Yield the sources of a folder, in one of the usual spellings."""
-    for name in USER_SOURCES:
-        spellings = (name, name.upper(), name.capitalize(), name.upper()[:-3] + "src")
-        yield from [place for one in spellings if (place := folder / one).is_file()][:1]
+    folders = [*(root / name for root in roots for name in FOLDERS), own.parent]
+    places = (listing.named(one, name) for one in folders for name in USER_SOURCES)
+    acting = (one for one in places if one and one != own and _acts(one))
+    return tuple({place.name.lower(): place for place in acting}.values())
 
 
 def _acts(place: Path) -> bool:

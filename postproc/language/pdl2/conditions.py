@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import lru_cache
 
-import numpy as np
-
-from postproc.arrays import Indices, Interned, Ints
+from postproc.arrays import Interned
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
 from postproc.language.pdl2.abstract_state import FRAMES, Settings
@@ -80,33 +78,24 @@ def disturbance(settings: Settings) -> Reason:
 class SettingTable:
     """Each distinct state of the settings is read off once."""
 
-    def __init__(self, conditions: Interned[Conditions]) -> None:
-        """Take the table that their conditions are entered in."""
-        self._table = conditions
-        self._kept: list[Settings] = []
+    def __init__(self) -> None:
+        """Begin without any."""
         self._rows = Interned[int]()
+        self.settings: list[Settings] = []  # keeps an id from being used again
+        self.conditions: list[Conditions] = []
         self._problems: list[tuple[Reason, Reason]] = []
-        self._conditions: list[int] = []
 
     def index(self, settings: Settings) -> int:
         """Return the row of a state of the settings."""
         row = self._rows[id(settings)]
-        if row == len(self._kept):
-            self._kept.append(settings)  # keeps its id from being used again
-            self._conditions.append(self._table[_conditions(settings)])
+        if row == len(self.settings):
+            self.settings.append(settings)
+            self.conditions.append(_conditions(settings))
             found = disturbance(settings)
             tool = ("tool", "tool_rmt")
             pose = found or _unknown(settings, ("uframe", "base", *tool))
             self._problems.append((pose, found or _unknown(settings, tool)))
         return row
-
-    def get_settings(self, row: int) -> Settings:
-        """Return the state of the settings of a row."""
-        return self._kept[row]
-
-    def conditions(self, rows: Ints) -> Indices:
-        """Return the conditions of some rows."""
-        return np.array(self._conditions, dtype=np.int32)[rows]
 
     def problem(self, row: int, target: Meaning) -> Reason:
         """Return why a visit cannot be compensated under these settings."""

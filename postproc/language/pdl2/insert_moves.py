@@ -92,7 +92,9 @@ class Pdl2Splitter(Splitter):
             raise CloneError("the move is not understood")
         rest = f" {settings[0]}" if settings else ""
         start = int(source.line_starts[line - 1])
-        return Pdl2Layout(source, start, code, head[1], "--", head[2] or "", rest)
+        way = _VIA.search(code)
+        via = Span(*way.span(1)) if way else None
+        return Pdl2Layout(source, start, code, head[1], "--", via, head[2] or "", rest)
 
 
 @dataclass(frozen=True)
@@ -105,14 +107,6 @@ class Pdl2Layout(MoveLayout):
 
     arm: str
     settings: str
-
-    @property
-    def via(self) -> Span:
-        """Return where the point of an arc stands, see `MoveLayout.via`."""
-        found = _VIA.search(self.code)
-        if found is None:
-            raise CloneError("the point on its way does not stand in the move")
-        return Span(*found.span(1))
 
     def place(self, numbers: Floats, config: str) -> str:
         """Write a position, its numbers (6,)."""

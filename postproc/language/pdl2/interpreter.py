@@ -22,13 +22,12 @@ from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.initial_values import fill_initial, keep_values
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
-    Goal,
     Machine,
-    MoveForm,
+    Pdl2Goal,
+    Pdl2Visit,
     invalidate,
     invalidate_names,
     let_others_run,
-    single,
 )
 from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.moves import move
@@ -240,9 +239,9 @@ def _unknown(machine: Machine, here: Execution, statement: ir.NotUnderstood) -> 
     why, arrived = _forget_names(here, statement.text), frozenset[int]()
     if _MOVES.match(statement.text):
         reason = Reason(Code.UNKNOWN_STATEMENT, "the move statement is not understood")
-        goal = Goal(Meaning.UNKNOWN, reason=reason)
-        form, come = MoveForm(Motion.JOINT), machine.predecessors(here)
-        arrival = single(here, form, come, here.store.settings, goal)
+        goal, come = Pdl2Goal(Meaning.UNKNOWN, why=reason), machine.predecessors(here)
+        settings, joint = here.store.settings, Motion.JOINT
+        arrival = Pdl2Visit(here.place, joint, False, goal, settings, come, at=here.row)
         arrived = frozenset({machine.record(here, 1, arrival)})
     if _forget_by_text(here, statement.text, why):
         here.store.last |= arrived

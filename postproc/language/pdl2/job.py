@@ -139,12 +139,14 @@ class Place:
 
     Attributes:
         program, body: Its program and its body.
+        file: Index of the program among the files of the job.
         offset, first: Job-wide index of the first row of the program, and of its first
             number.
     """
 
     program: Program
     body: Body
+    file: int
     offset: int
     first: int
 
@@ -240,7 +242,7 @@ class World:
         """Return where the statements of a body stand."""
         rows, first = self.numbering.rows, self.numbering.first
         at = self.numbering.names.index(program.lines.source.name)
-        return Place(program, body, rows[at], first[at])
+        return Place(program, body, at, rows[at], first[at])
 
     def report(self, program: Program, row: int, code: Code, message: str) -> None:
         """Collect a finding at a logical line."""

@@ -2,48 +2,71 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
-
-import numpy as np
+from functools import cached_property
 
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At, Context
+from postproc.language.analysis.found_goals import FoundGoal, FoundVisit
 from postproc.language.analysis.interpreter import Interpreter, calls_around
 from postproc.language.analysis.origins import MANY, NOWHERE, TOLD_TOGETHER, Origins
-from postproc.language.pdl2.abstract_state import GivenValues, Settings, Store
+from postproc.language.pdl2.abstract_state import GivenValues, Store
 from postproc.language.pdl2.evaluate import Execution, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
 from postproc.language.pdl2.side_effects import circles, list_invoked
-from postproc.language.pdl2.values import Nothing, Position
-from postproc.language.visits import Meaning
+from postproc.language.pdl2.values import Nothing
 from postproc.robot.trajectory import Motion
 
-Numbers = tuple[float | None, ...]
-_NO_NUMBERS: Numbers = (None,) * 6
+MOST_AXES = 12  # auxiliary axes that are told
+UNKNOWN = (math.nan,) * 6
+NO_AXES = (math.nan,) * MOST_AXES
+NO_SLOTS = (-1,) * 6
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
-    """What a destination means.
+@dataclass(frozen=True)
+class Pdl2Goal(FoundGoal):
+    """Where a move goes; what is computed from a part of a position holds its numbers.
 
     Attributes:
-        target: What the numbers mean.
-        numbers: Six numbers, None where not known.
-        position: The position value where there is one.
-        distance: For NEAR and FOR [mm].
-        reason: Why it cannot be compensated.
+        distance_mm: For NEAR and FOR.
+        config: Configuration string, None where there is none.
+        axes: Auxiliary axes that it names, None where they are not known.
+        taught: Marked as taught with the robot.
     """
 
-    target: Meaning
-    numbers: Numbers = _NO_NUMBERS
-    position: Position | None = None
-    distance: float | None = None
-    reason: Reason = NO_REASON
+    values: tuple[float, ...] = UNKNOWN
+    slots: tuple[int, ...] = NO_SLOTS
+    follows: tuple[int, ...] = NO_SLOTS
+    aux: tuple[float, ...] = NO_AXES
+    distance_mm: float = math.nan
+    config: str | None = None
+    axes: tuple[int, ...] | None = ()
+    taught: bool = False
+
+
+@dataclass
+class Pdl2Visit(FoundVisit):
+    """One arrival, as it is found; `scope` is the place of its move.
+
+    Attributes:
+        at: The row of its move.
+        fly: MOVEFLY.
+    """
+
+    scope: Place
+    goal: Pdl2Goal
+    at: int = field(kw_only=True)
+    fly: bool = field(kw_only=True, default=False)
+
+    @property
+    def row(self) -> int:
+        """The row of the move in its file."""
+        return self.at
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +77,6 @@ class MoveForm:
         motion: Trajectory.
         reason: Why that is not known, or why none can be compensated.
         fly: MOVEFLY.
-        via: The VIA point of an arc.
         slots: Number slots of the six numbers that stand in the move, () where it goes
             to something else.
         joints: Those are joint angles.
@@ -65,7 +87,6 @@ class MoveForm:
     motion: Motion
     reason: Reason = NO_REASON
     fly: bool = False
-    via: bool = False
     slots: tuple[int, ...] = ()
     joints: bool = False
     config: str | None = None
@@ -75,58 +96,34 @@ class MoveForm:
 WRITTEN, HELD = -1, -2  # instead of a row of the variable file
 
 
-@dataclass(frozen=True, slots=True)
-class MoveRun:
-    """Moves that follow each other, each from the one before; often a single one.
+@dataclass
+class MoveBlock(Pdl2Visit):
+    """Moves that follow each other, each from the one before.
 
     Attributes:
-        place: Where they stand.
-        rows: Their rows, (k,).
+        at_once: Their rows, (k,).
         form: Which form each has, (k,).
         forms: The forms, by number.
-        origins: Visits the first of them may come from.
-        settings: Frames and motion variables that hold, but for overrides.
         point: Row of the variable file that each goes to, (k,); WRITTEN where the
             numbers stand in the move, HELD where its goal was evaluated.
         goals: These, by the index of the move.
-        reason: Why none of them can be compensated.
     """
 
-    place: Place
-    rows: Ints
-    form: Ints
-    forms: Mapping[int, MoveForm]
-    origins: Origins
-    settings: Settings
-    point: Ints
-    goals: Mapping[int, Goal]
-    reason: Reason = NO_REASON
+    at_once: Ints = field(kw_only=True)
+    form: Ints = field(kw_only=True)
+    forms: Mapping[int, MoveForm] = field(kw_only=True)
+    point: Ints = field(kw_only=True)
+    goals: Mapping[int, Pdl2Goal] = field(kw_only=True)
 
     @property
-    def count(self) -> int:
-        """The number of visits."""
-        return len(self.rows)
+    def rows(self) -> Ints:
+        """The rows of all moves that it stands for."""
+        return self.at_once
 
-
-_FIRST, _HELD = np.zeros(1, dtype=np.int64), np.full(1, HELD)
-
-
-@lru_cache(maxsize=64)
-def _only(form: MoveForm) -> dict[int, MoveForm]:
-    """Return the forms of a run of one move: the same ones for all that are alike."""
-    return {0: form}
-
-
-def single(
-    here: Execution,
-    form: MoveForm,
-    origins: Origins,
-    settings: Settings,
-    goal: Goal,
-) -> MoveRun:
-    """Return the run of one move, whose goal was evaluated."""
-    row, forms = np.array([here.row]), _only(form)
-    return MoveRun(here.place, row, _FIRST, forms, origins, settings, _HELD, {0: goal})
+    @property
+    def is_run(self) -> bool:
+        """Whether more than its first move is to be filled."""
+        return True
 
 
 DEEP = 64  # calls within calls, from where on it pays to know which call themselves
@@ -157,15 +154,15 @@ class Machine(Interpreter[Store]):
     _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
     _numbers: dict[Key, int] = field(default_factory=dict)
 
-    def record(self, here: Execution, sub: int, run: MoveRun) -> int:
+    def record(self, here: Execution, sub: int, visit: Pdl2Visit) -> int:
         """Keep visits, and return their number; the last analysis of a place holds."""
         key = (here.context, here.place.offset + here.row, sub)
         number = self._numbers.setdefault(key, len(self.visits))
         if number == len(self.visits):
             self.keys.append(key)
-            self.visits.append(run)
-        self.visits[number] = run
-        if MANY in run.origins:
+            self.visits.append(visit)
+        self.visits[number] = visit
+        if MANY in visit.origins:
             here.report_once(Code.MANY_ORIGINS, str(here.row), TOLD_TOGETHER)
         return number
 

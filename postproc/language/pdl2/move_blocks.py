@@ -17,10 +17,10 @@ from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.machine import (
     HELD,
     WRITTEN,
-    Goal,
     Machine,
+    MoveBlock,
     MoveForm,
-    MoveRun,
+    Pdl2Goal,
 )
 from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
 from postproc.language.pdl2.program import ProgramLines
@@ -28,6 +28,7 @@ from postproc.language.pdl2.side_effects import CHANGING, PURE, list_invoked
 from postproc.language.pdl2.values import Nothing
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import alike, name_index, number_in_order
+from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
 # Lines that are run a thousand at a time: moves to known places, idle calls.
@@ -304,7 +305,9 @@ def _calls(
 
 # Run a stretch of quiet lines at once.
 
+LEAST = 2  # lines that are worth it
 _NO_INDEX = Nothing("its index is known only at run time")
+_OF_EACH = Pdl2Goal(Meaning.UNKNOWN)  # each move of a block has its own
 
 
 @dataclass
@@ -314,7 +317,7 @@ class MoveBlocks:
     machine: Machine
     quiet: dict[int, PlainMoves] = field(default_factory=dict)
     _may_be: dict[int, Bools] = field(default_factory=dict)
-    _written: dict[tuple[int, int], MoveRun] = field(default_factory=dict)
+    _written: dict[tuple[int, int], MoveBlock] = field(default_factory=dict)
 
     def run(self, here: Execution) -> bool:
         """Run the stretch that begins at a row; tell whether there is one.
@@ -327,11 +330,11 @@ class MoveBlocks:
             return False
         quiet = self._quiet(here)
         end = quiet.end(here.row)
-        if end == here.row:
+        if end - here.row < LEAST:
             return False
         first = (id(here.place.body), here.row)
         run = self._written.get(first)
-        if run is None or run.settings is not here.store.settings:
+        if run is None or run.modes is not here.store.settings:
             rows = np.arange(here.row, end)
             variant = quiet.variant[rows - quiet.first]
             run = self._run_all(here, quiet, rows, variant)
@@ -344,17 +347,20 @@ class MoveBlocks:
 
     def _run_all(
         self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-    ) -> MoveRun:
+    ) -> MoveBlock:
         """Run the lines of a stretch; return its moves."""
         forms = self._run_one_of_each(here, quiet, rows, variant)
         moves = np.isin(variant, np.array([*forms], dtype=np.int64))
         rows, variant = rows[moves], variant[moves]
         here.row = int(rows[0])
-        point, goals = _points(here, quiet, rows, variant)
-        settings, nowhere = here.store.settings, frozenset[int]()
-        return MoveRun(
-            here.place, rows, variant, forms, nowhere, settings, point, goals
-        )
+        point, goals = np.full(len(rows), WRITTEN), dict[int, Pdl2Goal]()
+        if not all(form.slots for form in forms.values()):
+            point, goals = _points(here, quiet, rows, variant)
+        return MoveBlock(
+            here.place, Motion.JOINT, False, _OF_EACH, here.store.settings,
+            count=len(rows), at=here.row, at_once=rows, form=variant, forms=forms,
+            point=point, goals=goals,
+        )  # fmt: skip
 
     def _quiet(self, here: Execution) -> PlainMoves:
         program, body = here.place.program, here.place.body
@@ -389,25 +395,25 @@ class MoveBlocks:
                 forms[number] = replace(form, motion=motion, reason=reason)
         return forms
 
-    def _record(self, here: Execution, run: MoveRun) -> None:
+    def _record(self, here: Execution, run: MoveBlock) -> None:
         """Record moves and let the arm stand at the end of the last.
 
         Moves to written numbers are the same ones again under the same settings: what
         differs is where the arm comes from.
         """
-        here.row = int(run.rows[0])
+        here.row = run.at
         come = self.machine.predecessors(here)
-        run = replace(run, origins=come, reason=here.reason)
+        run = replace(run, origins=come)
         here.store.last = frozenset({self.machine.record(here, 0, run)})
 
 
 def _points(
     here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-) -> tuple[Ints, dict[int, Goal]]:
-    """Look up the variables that moves go to, see `MoveRun`."""
+) -> tuple[Ints, dict[int, Pdl2Goal]]:
+    """Look up the variables that moves go to, see `MoveBlock`."""
     program, initial = here.place.program, here.world.initial
     point = np.full(len(rows), WRITTEN, dtype=np.int64)
-    goals: dict[int, Goal] = {}
+    goals: dict[int, Pdl2Goal] = {}
     to_points = [form is not None and not form.slots for form in quiet.forms]
     named = np.flatnonzero(np.array(to_points, dtype=bool)[variant])
     shapes = program.lines.shape[rows[named]]

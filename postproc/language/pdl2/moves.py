@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from postproc.diagnostics import NO_REASON, Code, Reason
@@ -10,9 +12,25 @@ from postproc.language.analysis.origins import NOWHERE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.evaluate import SINGLE, Execution, parts_under
-from postproc.language.pdl2.machine import Goal, Machine, MoveForm, escape_names, single
+from postproc.language.pdl2.machine import (
+    MOST_AXES,
+    NO_AXES,
+    NO_SLOTS,
+    UNKNOWN,
+    Machine,
+    Pdl2Goal,
+    Pdl2Visit,
+    escape_names,
+)
 from postproc.language.pdl2.side_effects import goes_to_target
-from postproc.language.pdl2.values import Nothing, Position, Value, Vector, add_unknown
+from postproc.language.pdl2.values import (
+    Nothing,
+    Position,
+    Value,
+    Vector,
+    add_unknown,
+    may_be,
+)
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 
@@ -85,7 +103,7 @@ UNSURE = "a move whose target is uncertain may go to it"
 _PLACES = {"home": Meaning.HOME, "cal_sys": Meaning.CALIBRATION}
 
 
-def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
+def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Pdl2Goal:
     """Tell where a move goes."""
     where = statement.where
     match statement.how:
@@ -94,62 +112,63 @@ def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
         case "RELATIVE":
             vector, frame = here.value(where[0]), _FRAME.get(statement.frame)
             if isinstance(vector, Vector) and frame is not None:
-                numbers = (*vector.numbers, None, None, None)
-                return _no_target(frame, numbers, "RELATIVE")
+                return _no_target(frame, vector.numbers, "RELATIVE")
         case "AWAY":
-            distance = here.real(where[0])
-            return _no_target(Meaning.AWAY, (distance, *(None,) * 5), "AWAY")
+            return _no_target(Meaning.AWAY, (here.real(where[0]),), "AWAY")
         case "NEAR":
-            goal = absolute(here, where[0])
-            distance = here.real(where[1])
-            if goal.target is Meaning.POSE and distance is not None:
-                near = goal.position and replace(goal.position, name="", derived="NEAR")
-                return Goal(Meaning.NEAR, goal.numbers, near, distance, _why("NEAR"))
-        case "FOR":
-            return _towards(here, where, motion)
+            return _short_of(here, Meaning.NEAR, where[0], where[1])
+        case "FOR":  # a place of its own on a straight line only
+            return _short_of(
+                here, Meaning.FOR, where[1], where[0], motion is Motion.LINEAR, 0.0
+            )
         case "ALONG":
             return _along(here, where[0])
         case "ABOUT":
-            return _about(here, where, statement.frame)
+            axis, angle = here.value(where[0]), here.real(where[1])
+            if isinstance(axis, Vector) and statement.frame in _FRAME:
+                numbers = (*axis.numbers, angle, float(_FRAME[statement.frame]))
+                return _no_target(Meaning.ABOUT, numbers, "ABOUT")
         case "BY":
             by = here.value(where[0])
             here.world.pin(by, "MOVE BY goes on by it")
             if isinstance(by, Position) and by.joints:
                 return _no_target(Meaning.BY, by.numbers, "BY")
-    return Goal(Meaning.UNKNOWN, reason=_why(statement.how))
+    return Pdl2Goal(Meaning.UNKNOWN, why=_why(statement.how))
 
 
 def _why(word: str) -> Reason:
     return Reason(Code.NO_TARGET, f"the move holds no target of its own ({word})")
 
 
-def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) -> Goal:
+def _no_target(target: Meaning, numbers: Sequence[float | None], word: str) -> Pdl2Goal:
     """Return a goal that can be planned only where all its numbers are known."""
-    needed = {Meaning.AWAY: 1, Meaning.BY: 6, Meaning.ABOUT: 5}.get(target, 3)
-    if None in numbers[:needed]:
-        return Goal(Meaning.UNKNOWN, reason=_why(word))
-    return Goal(target, numbers, reason=_why(word))
+    known = [x for x in numbers if x is not None]
+    if len(known) < len(numbers):
+        return Pdl2Goal(Meaning.UNKNOWN, why=_why(word))
+    return Pdl2Goal(target, (*known, *UNKNOWN[len(known) :]), why=_why(word))
 
 
-def _about(here: Execution, where: tuple[ir.Operand, ...], frame: str) -> Goal:
-    axis, angle = here.value(where[0]), here.real(where[1])
-    if not isinstance(axis, Vector) or frame not in _FRAME:
-        return Goal(Meaning.UNKNOWN, reason=_why("ABOUT"))
-    numbers = (*axis.numbers, angle, float(_FRAME[frame]), None)
-    return _no_target(Meaning.ABOUT, numbers, "ABOUT")
+def _short_of(
+    here: Execution,
+    target: Meaning,
+    place: ir.Operand,
+    by: ir.Operand,
+    known: bool = True,
+    least: float = -math.inf,
+) -> Pdl2Goal:
+    """Go near a pose, or a distance of at least so much towards it."""
+    goal, distance = absolute(here, place), here.real(by)
+    if goal.target is not Meaning.POSE or not known:
+        return Pdl2Goal(Meaning.UNKNOWN, why=_why(target.name))
+    if distance is None or distance < least:
+        return Pdl2Goal(Meaning.UNKNOWN, why=_why(target.name))
+    return replace(
+        goal, target=target, slots=NO_SLOTS, follows=goal.origin, name="",
+        distance_mm=distance, why=_why(target.name),
+    )  # fmt: skip
 
 
-def _towards(here: Execution, where: tuple[ir.Operand, ...], motion: Motion) -> Goal:
-    """Go a distance towards a pose: a place of its own on a straight line only."""
-    goal, distance = absolute(here, where[1]), here.real(where[0])
-    known = goal.target is Meaning.POSE and distance is not None and distance >= 0.0
-    if not known or motion is not Motion.LINEAR:
-        return Goal(Meaning.UNKNOWN, reason=_why("FOR"))
-    towards = goal.position and replace(goal.position, name="", derived="FOR")
-    return Goal(Meaning.FOR, goal.numbers, towards, distance, _why("FOR"))
-
-
-def _along(here: Execution, path: ir.Operand) -> Goal:
+def _along(here: Execution, path: ir.Operand) -> Pdl2Goal:
     """Go along a path: its nodes must stay, for the arm goes to them from elsewhere."""
     name = path.name if isinstance(path, ir.DataObject) else ""
     why = f"MOVE ALONG {name} goes to it too"
@@ -158,10 +177,10 @@ def _along(here: Execution, path: ir.Operand) -> Goal:
         f"the nodes of a path are not followed (MOVE ALONG {name}): the next move is "
         "assumed to start at an unknown place"
     )
-    return Goal(Meaning.UNKNOWN, reason=Reason(Code.POSITION_UNKNOWN, reason))
+    return Pdl2Goal(Meaning.UNKNOWN, why=Reason(Code.POSITION_UNKNOWN, reason))
 
 
-def absolute(here: Execution, expression: ir.Operand) -> Goal:
+def absolute(here: Execution, expression: ir.Operand) -> Pdl2Goal:
     """Tell what a place means that does not depend on where the arm is."""
     if isinstance(expression, ir.DataObject) and expression.name.startswith("$"):
         return _system(here, expression)
@@ -181,7 +200,7 @@ def absolute(here: Execution, expression: ir.Operand) -> Goal:
     return from_value(value)
 
 
-def _system(here: Execution, reference: ir.DataObject) -> Goal:
+def _system(here: Execution, reference: ir.DataObject) -> Pdl2Goal:
     """Tell where a place of the controller is; it belongs to no target."""
     name = here.setting_name(reference)
     if name is None:
@@ -194,27 +213,42 @@ def _system(here: Execution, reference: ir.DataObject) -> Goal:
         unknown = Nothing(f"${name.upper()} is a system variable")
         return from_value(held or unknown, True)
     if held is None:
-        return Goal(_PLACES[name], reason=_why(f"${name.upper()}"))
-    return replace(from_value(held), reason=_why(f"${name.upper()}"))
+        return Pdl2Goal(_PLACES[name], why=_why(f"${name.upper()}"))
+    return replace(from_value(held), why=_why(f"${name.upper()}"))
 
 
-def from_value(value: Value, system: bool = False) -> Goal:
+def from_value(value: Value, system: bool = False) -> Pdl2Goal:
     """Tell what a move to a value means; `system`: to that of a system variable."""
     if isinstance(value, Nothing):
         reason = Reason(value.code, f"the target is not known: {value.why}")
-        return Goal(Meaning.UNKNOWN, reason=reason)
+        return Pdl2Goal(Meaning.UNKNOWN, why=reason)
     if not isinstance(value, Position):
-        return Goal(Meaning.UNKNOWN, reason=NO_POSITION)
+        return Pdl2Goal(Meaning.UNKNOWN, why=NO_POSITION)
+    target = Meaning.JOINTS if value.joints else Meaning.POSE
+    numbers = tuple(x for x in value.numbers if x is not None)
     if not value.complete:
-        return Goal(Meaning.UNKNOWN, position=value, reason=IN_PART)
-    reason = NO_REASON if value.editable else COMPUTED
-    if value.derived:
+        target, numbers, reason = Meaning.UNKNOWN, UNKNOWN, IN_PART
+    elif value.derived:
         text = f"the target is computed: {value.derived}"
         reason = Reason(Code.COMPUTED_TARGET, text)
     elif system:
         reason = SYSTEM
-    target = Meaning.JOINTS if value.joints else Meaning.POSE
-    return Goal(target, value.numbers, value, reason=reason)
+    else:
+        reason = NO_REASON if value.editable else COMPUTED
+    slots, own = value.slots, value.complete and value.editable
+    along = not own and target is Meaning.POSE and -1 not in slots
+    axes = None if value.aux is None else tuple([axis for axis, _ in value.aux])
+    return Pdl2Goal(
+        target, numbers, slots if own else NO_SLOTS, slots if along else NO_SLOTS,
+        value.name, _read_aux(value) if value.aux else NO_AXES, reason,
+        shared=value.shared, config=value.config, axes=axes, taught=value.taught,
+        holds=frozenset() if own or along else may_be(value),
+    )  # fmt: skip
+
+
+def _read_aux(value: Position) -> tuple[float, ...]:
+    given = {axis: x for axis, x in value.aux or () if x is not None}
+    return tuple([given.get(axis, math.nan) for axis in range(1, MOST_AXES + 1)])
 
 
 NO_POSITION = Reason(Code.RUNTIME_VALUE, "the target is no position")
@@ -232,7 +266,6 @@ _FROM_HERE = frozenset(
     {Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
      Meaning.AWAY, Meaning.ABOUT, Meaning.BY, Meaning.FOR}
 )  # fmt: skip
-_VIA, _END = 0, 1
 
 
 def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
@@ -253,18 +286,21 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     reason = here.reason or reason
     predecessors = machine.predecessors(here)
     several = len(predecessors) > 1
+
+    def arrive(goal: Pdl2Goal, via: bool, fly: bool) -> int:
+        visit = Pdl2Visit(
+            here.place, motion, via, goal, settings, predecessors, reason,
+            at=here.row, fly=fly,
+        )  # fmt: skip
+        return machine.record(here, not via, visit)
+
     if statement.via is not None:
         goal = absolute(here, statement.via)
-        form = MoveForm(motion, reason, fly=True, via=True)
-        via = single(here, form, predecessors, settings, goal)
-        predecessors = frozenset({machine.record(here, _VIA, via)})
+        predecessors = frozenset({arrive(goal, True, True)})
         if machine.interrupted:  # the arm may have been moved off the way
             predecessors |= NOWHERE
     goal = goal_of(here, statement, motion)
-    form = MoveForm(motion, reason, fly=statement.fly)
-    end = single(here, form, predecessors, settings, goal)
-    arrived = machine.record(here, _END, end)
-    store.last = frozenset({arrived})
+    store.last = frozenset({arrive(goal, False, statement.fly)})
     if several and goal.target in _FROM_HERE:
         store.last |= NOWHERE
     if statement.til is not None or whose is None:

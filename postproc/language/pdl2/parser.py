@@ -316,11 +316,8 @@ VALUE_RULES: Mapping[str, Rule] = {
 }
 
 
-LONGEST = 1 << 18  # characters of a form; lines of real programs have some hundreds
-DEEPEST = 200  # operators or parentheses within each other; followed by recursion
-
-_PARSER = FormParser("pdl2", RULES, (), LONGEST, DEEPEST, "line")
-_VALUE_PARSER = FormParser("lsv", VALUE_RULES, (), LONGEST, DEEPEST, "line")
+_PARSER = FormParser("pdl2", RULES, (), start="line")
+_VALUE_PARSER = FormParser("lsv", VALUE_RULES, (), start="line")
 
 
 @lru_cache(maxsize=8192)

@@ -13,7 +13,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ProgramError
-from postproc.files import read_input
+from postproc.files import FolderListing, read_input
 from postproc.language.language import Archive
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
@@ -55,32 +55,25 @@ class MountedArm:
         return pose
 
 
-def system_modules(program: Path) -> tuple[Path, ...]:
+def system_modules(program: Path, listing: FolderListing) -> tuple[Path, ...]:
     """Return the system modules of the task of a program in a backup.
 
     They are read and never rewritten. What is no module that can be read is left out.
-
-    Args:
-        program: A module in ``PROGMOD``.
     """
     task = _task_of(program)
-    return () if task is None else _modules(_entry(task, SYSTEM))
+    return () if task is None else _modules(task, (SYSTEM,), listing)
 
 
-def modules_beside(program: Path) -> tuple[Path, ...]:
+def modules_beside(program: Path, listing: FolderListing) -> tuple[Path, ...]:
     """Return the modules of all other tasks of the backup that a program stands in.
 
     They run at the same time, and may change data that several tasks declare.
-
-    Args:
-        program: A module in ``PROGMOD``.
     """
     own = _task_of(program)
-    if own is None:
-        return ()
-    tasks = (p for p in sorted(own.parent.iterdir()) if p.is_dir() and p != own)
-    folders = (_entry(task, name) for task in tasks for name in (PROGRAMS, SYSTEM))
-    return tuple(module for folder in folders for module in _modules(folder))
+    tasks = () if own is None else listing.entries(own.parent)
+    folders = (task for task in tasks if task.is_dir() and task != own)
+    found = (_modules(task, (PROGRAMS, SYSTEM), listing) for task in folders)
+    return tuple(itertools.chain.from_iterable(found))
 
 
 def _task_of(program: Path) -> Path | None:
@@ -90,17 +83,18 @@ def _task_of(program: Path) -> Path | None:
     return folder.parent if in_task else None
 
 
-def _modules(folder: Path | None) -> tuple[Path, ...]:
-    """Return the modules of a folder that can be read."""
-    if folder is None or not folder.is_dir():
-        return ()
-    readable = []
-    for path in sorted(folder.iterdir()):
-        if RapidFileName(path.name).is_program and path.is_file():
-            at = path.stat()  # system modules may be encoded
-            if _is_text(path, at.st_mtime_ns, at.st_size):
-                readable.append(path)
-    return tuple(readable)
+def _modules(
+    task: Path, names: Iterable[str], listing: FolderListing
+) -> tuple[Path, ...]:
+    """Return the modules in some folders of a task that can be read."""
+    folders = filter(None, (listing.named(task, name) for name in names))
+    every = (
+        path
+        for folder in folders
+        for path in listing.ending(folder, RapidFileName.programs)
+    )
+    stats = ((path, path.stat()) for path in every)  # system modules may be encoded
+    return tuple(p for p, at in stats if _is_text(p, at.st_mtime_ns, at.st_size))
 
 
 def read_mounted_arms(program: Path) -> tuple[MountedArm, ...]:

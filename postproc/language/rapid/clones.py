@@ -74,8 +74,9 @@ class RapidCloner(TaskCloner):
         text, modules = self.task.files[file].text, self.task.files[file].modules
         if len(modules) != 1 or self.task.files[file].is_system:
             raise CloneError("its moves stand in no module that is rewritten")
-        rows = (text.statement(row) for row in range(modules[0].first, modules[0].last))
-        if any(isinstance(one, said.RecordHead | said.TypeAlias) for one in rows):
+        inside = range(modules[0].first + 1, modules[0].last)
+        types = ir.ScopeHead | said.TypeAlias
+        if any(isinstance(text.statement(row), types) for row in inside):
             raise CloneError("the module of its moves defines types, which stand first")
         begin, end = text.span(modules[0].first)
         if not ends_line(text.source, end):

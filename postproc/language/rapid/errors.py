@@ -89,10 +89,6 @@ def together(one: Numbers, other: Numbers) -> Numbers:
     return None if one is None or other is None else one | other
 
 
-ReadNumber = Callable[[ir.Operand | None, int], str]
-"""Names an error number that stands in a row, "" where it is not known."""
-
-
 def key_of(operand: ir.Operand | None, value: float) -> str:
     """Name an error number, "" where it is not known.
 
@@ -115,36 +111,6 @@ def numbers_of(
     return ANY if "" in names or EVERY_JUMP in names else names
 
 
-def clauses_of(
-    text: StatementText[ir.SourceStatement], flow: ControlFlow, read: ReadNumber
-) -> tuple[ErrorClause, ...]:
-    """Read the error handlers of a routine.
-
-    Args:
-        text: The statements of its file.
-        flow: Its blocks.
-        read: Names an error number.
-    """
-    found: list[ErrorClause] = []
-    rows = list(flow.handlers)
-    starts = [k for k in rows if begins_handler(text.statement(k))]
-    starts.append(flow.handlers.stop)
-    for first, behind in pairwise(starts):
-        head = text.statement(first)
-        if isinstance(head, said.ErrorHandler):
-            listed = bool(head.numbers)
-            numbers = _read(head.numbers, first, read) if listed else ANY
-            statements = [(k, text.statement(k)) for k in range(first + 1, behind)]
-            ends = tuple(_ends(statements, read))
-            found.append(ErrorClause(numbers, listed, ends))
-    return tuple(found)
-
-
-def _read(operands: Iterable[ir.Operand | None], row: int, read: ReadNumber) -> Numbers:
-    """Name the error numbers of a statement."""
-    return numbers_of(operands, lambda operand: read(operand, row))
-
-
 def begins_handler(one: ir.SourceStatement) -> bool:
     """Return True if a clause behind the statements of a routine begins."""
     return isinstance(one, said.ErrorHandler) or (
@@ -152,61 +118,81 @@ def begins_handler(one: ir.SourceStatement) -> bool:
     )
 
 
-def _ends(
-    statements: Iterable[tuple[int, ir.SourceStatement]], read: ReadNumber
-) -> Iterator[HandlerEnd]:
-    """Find how a handler goes on, and with which errors each word is reached."""
-    blocks: list[tuple[Numbers, bool]] = []  # each with whether it tests ERRNO
-    for row, one in statements:
-        match one:
-            case ir.Branch(word="if", values=(condition, *_)):
-                blocks.append((_find_errors(condition, row, read), False))
-            case ir.Branch(word="elseif", values=(condition, *_)) if blocks:
-                blocks[-1] = _find_errors(condition, row, read), False
-            case ir.Branch(word="test", values=(value, *_)):
-                blocks.append((NO_NUMBERS, _is_errno(value)))
-            case ir.Branch(word="case", values=values) if blocks:
-                tested = blocks[-1][1]
-                blocks[-1] = _read(values, row, read) if tested else ANY, tested
-            case ir.Branch(word="default") | ir.BlockWord(word="else") if blocks:
-                blocks[-1] = ANY, blocks[-1][1]
-            case ir.Branch() | ir.ForLoop():
-                blocks.append((ANY, False))
-            case ir.BlockWord(word=word) if word in CLOSING and blocks:
-                blocks.pop()
-            case _:
-                numbers = reduce(common, (numbers for numbers, _ in blocks), ANY)
-                yield from _end(one, row, numbers, read)
+@dataclass(frozen=True)
+class HandlerReader:
+    """Reads the error handlers of a routine.
 
+    Attributes:
+        text: The statements of its file.
+        name: Names an error number that stands in a row, "" where it is not known.
+    """
 
-def _end(
-    one: ir.SourceStatement, row: int, numbers: Numbers, read: ReadNumber
-) -> Iterator[HandlerEnd]:
-    """Yield the word with which a statement of a handler goes on."""
-    while isinstance(one, said.CompactIf):
-        numbers = common(numbers, _find_errors(one.condition, row, read))
-        one = one.statement
-    if isinstance(one, ir.Leave) and one.word in LEAVES:
-        yield numbers, one.word
-    elif isinstance(one, ir.Instruction) and one.name == EXIT_CYCLE:
-        yield numbers, EXIT_CYCLE
-    elif isinstance(one, ir.JumpTo | ir.NotUnderstood):  # that is not followed
-        yield from ((ANY, word) for word in LEAVES)
+    text: StatementText[ir.SourceStatement]
+    name: Callable[[ir.Operand | None, int], str]
 
+    def clauses(self, flow: ControlFlow) -> tuple[ErrorClause, ...]:
+        """Read those of a routine with these blocks."""
+        found, rows = list[ErrorClause](), flow.handlers
+        starts = [k for k in rows if begins_handler(self.text.statement(k))]
+        for first, behind in pairwise([*starts, rows.stop]):
+            head = self.text.statement(first)
+            if isinstance(head, said.ErrorHandler):
+                numbers = self._name_all(head.numbers, first) if head.numbers else ANY
+                ends = tuple(self._ends(range(first + 1, behind)))
+                found.append(ErrorClause(numbers, bool(head.numbers), ends))
+        return tuple(found)
 
-def _find_errors(condition: ir.Operand, row: int, read: ReadNumber) -> Numbers:
-    """Return the errors for which a condition can hold."""
-    match condition:
-        case ir.Operation(operator="=", operands=(left, right)):
-            if _is_errno(left) or _is_errno(right):
-                return _read([right if _is_errno(left) else left], row, read)
-        case ir.Operation(operator="OR", operands=(left, right)):
-            return together(
-                _find_errors(left, row, read), _find_errors(right, row, read)
-            )
-        case ir.Operation(operator="AND", operands=(left, right)):
-            return common(_find_errors(left, row, read), _find_errors(right, row, read))
-    return ANY
+    def _name_all(self, operands: Iterable[ir.Operand | None], row: int) -> Numbers:
+        return numbers_of(operands, lambda operand: self.name(operand, row))
+
+    def _ends(self, rows: range) -> Iterator[HandlerEnd]:
+        """Find how a handler goes on, and with which errors each word is reached."""
+        blocks: list[tuple[Numbers, bool]] = []  # each with whether it tests ERRNO
+        for row in rows:
+            match one := self.text.statement(row):
+                case ir.Branch(word="if", values=(condition, *_)):
+                    blocks.append((self._find_errors(condition, row), False))
+                case ir.Branch(word="elseif", values=(condition, *_)) if blocks:
+                    blocks[-1] = self._find_errors(condition, row), False
+                case ir.Branch(word="test", values=(value, *_)):
+                    blocks.append((NO_NUMBERS, _is_errno(value)))
+                case ir.Branch(word="case", values=values) if blocks:
+                    tested = blocks[-1][1]
+                    blocks[-1] = self._name_all(values, row) if tested else ANY, tested
+                case ir.Branch(word="default") | ir.BlockWord(word="else") if blocks:
+                    blocks[-1] = ANY, blocks[-1][1]
+                case ir.Branch() | ir.ForLoop():
+                    blocks.append((ANY, False))
+                case ir.BlockWord(word=word) if word in CLOSING and blocks:
+                    blocks.pop()
+                case _:
+                    numbers = reduce(common, (numbers for numbers, _ in blocks), ANY)
+                    yield from self._end(one, row, numbers)
+
+    def _end(
+        self, one: ir.SourceStatement, row: int, numbers: Numbers
+    ) -> Iterator[HandlerEnd]:
+        """Yield the word with which a statement of a handler goes on."""
+        while isinstance(one, said.CompactIf):
+            numbers = common(numbers, self._find_errors(one.condition, row))
+            one = one.statement
+        if isinstance(one, ir.Leave) and one.word in LEAVES:
+            yield numbers, one.word
+        elif isinstance(one, ir.Instruction) and one.name == EXIT_CYCLE:
+            yield numbers, EXIT_CYCLE
+        elif isinstance(one, ir.JumpTo | ir.NotUnderstood):  # that is not followed
+            yield from ((ANY, word) for word in LEAVES)
+
+    def _find_errors(self, condition: ir.Operand, row: int) -> Numbers:
+        """Return the errors for which a condition can hold."""
+        match condition:
+            case ir.Operation(operator="=", operands=(left, right)):
+                if _is_errno(left) or _is_errno(right):
+                    return self._name_all([right if _is_errno(left) else left], row)
+            case ir.Operation(operator="OR" | "AND" as word, operands=operands):
+                one, other = (self._find_errors(part, row) for part in operands)
+                return (together if word == "OR" else common)(one, other)
+        return ANY
 
 
 def _is_errno(operand: ir.Operand | None) -> bool:

@@ -86,9 +86,11 @@ class RapidSplitter(TaskSplitter):
         if not {name.lower() for name in _OPTION.findall(zone)} <= _IN_ZONE:
             raise CloneError("its arguments are not understood")
         indent = code[: head.start(1)]
+        via = items[0] if code[items[0].start] == "[" else None
         return RapidLayout(
-            source, start, code, indent, "!", tuple(items), longest=LONGEST_STATEMENT
-        )
+            source, start, code, indent, "!", via, tuple(items[-3:]),
+            longest=LONGEST_STATEMENT,
+        )  # fmt: skip
 
 
 SPLITTER = RapidSplitter
@@ -99,18 +101,10 @@ class RapidLayout(MoveLayout):
     """How a move is laid out, see `MoveLayout`.
 
     Attributes:
-        items: Where its arguments stand in the line: targets, speed, zone, tool.
+        items: Where speed, zone and tool stand in the line.
     """
 
     items: tuple[Span, ...]
-
-    @property
-    def via(self) -> Span:
-        """Return where the point of an arc stands, see `MoveLayout.via`."""
-        begin, end = self.items[0]
-        if self.code[begin] != "[":
-            raise CloneError("the point on its way does not stand in the move")
-        return Span(begin, end)
 
     def place(self, numbers: Floats, config: str) -> str:
         """Write a robtarget, its numbers (11,)."""
@@ -120,7 +114,7 @@ class RapidLayout(MoveLayout):
 
     def move(self, end: str, via: str | None, stops: bool) -> str:
         """Write a move, see `MoveLayout.move`."""
-        speed, tool = (self.code[slice(*self.items[k])] for k in (-3, -1))
+        speed, _, tool = (self.code[slice(*item)] for item in self.items)
         zone = "fine" if stops else ZONE
         word, way = ("MoveL", end) if via is None else ("MoveC", f"{via},{end}")
         return f"{word} {way},{speed},{zone},{tool};"

@@ -48,10 +48,7 @@ from postproc.language.visits import START
 
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
-_PLAIN = (
-    said.FileHeader, ir.Declaration, said.ConnectTrap, ir.Assignment,
-    said.TypeAlias,
-)  # fmt: skip
+_PLAIN = (ir.Declaration, said.ConnectTrap, ir.Assignment, said.TypeAlias)
 _PASSED = (*_PLAIN, ir.SourceStatement, ir.LabelMark)
 
 
@@ -178,7 +175,7 @@ class RapidMachine(TaskMachine):
             def read(operand: ir.Operand | None, row: int) -> str:
                 return errors.key_of(operand, self.task.number(operand, scope.at(row)))
 
-            clauses = errors.clauses_of(text, place.flow, read)
+            clauses = errors.HandlerReader(text, read).clauses(place.flow)
             rows = place.flow.handlers
             effects, called = self.read_rows(scope, rows, (errors.EXIT_CYCLE,))
             if moves := bool(effects.union(*map(self.routine_effects, called))):

@@ -57,14 +57,10 @@ class Rapid(TaskLanguage):
         """Return True for a module of another task."""
         return bool(RapidFileName(source.name).task_beside)
 
-    def reads(
-        self,
-        program: Path,
-        within: Path | None = None,
-        listing: FolderListing | None = None,
-    ) -> tuple[Path, ...]:
+    def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
         """Return the system modules of the task, and the modules of others."""
-        return (*backup.system_modules(program), *backup.modules_beside(program))
+        own = backup.system_modules(program, listing)
+        return (*own, *backup.modules_beside(program, listing))
 
     def read_archive(self, folder: Path) -> language.Archive | None:
         """Read ``MOC.cfg`` of a backup."""

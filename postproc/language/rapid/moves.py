@@ -15,7 +15,11 @@ from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame, compose_poses
-from postproc.language.analysis.found_goals import FoundGoal, not_reached
+from postproc.language.analysis.found_goals import (
+    FoundGoal,
+    FoundVisit,
+    not_reached,
+)
 from postproc.language.analysis.values import (
     Value,
     WrittenNumber,
@@ -68,7 +72,7 @@ _CARRIED = Reason(
 
 
 @dataclass
-class RapidVisit(goals.FoundVisit):
+class RapidVisit(FoundVisit):
     r"""One arrival, as it is found.
 
     Attributes:

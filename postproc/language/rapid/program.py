@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from postproc import _native
 from postproc.diagnostics import Code
 from postproc.language import ir
@@ -16,7 +14,7 @@ from postproc.language.analysis.symbols import holds_odd
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import MOTIONS
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.rapid.syntax import CompactIf, ModuleHead, RecordHead
+from postproc.language.rapid.syntax import CompactIf
 from postproc.language.text.blocks import INNER, BlockWords, Outline
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
@@ -51,7 +49,7 @@ class RapidFile(TaskFile):
         It is one by its place in a backup, by its suffix, or by what a module says.
         """
         heads = (scope.head for scope in self.modules)
-        said = any(isinstance(h, ModuleHead) and _SYSTEM in h.attributes for h in heads)
+        said = any(_SYSTEM in getattr(head, "attributes", ()) for head in heads)
         return said or RapidFileName(self.text.source.name).is_named_as_system
 
     def module_of(self, routine: HeadedRows) -> str:
@@ -83,13 +81,7 @@ def read_rapid(source: Source) -> RapidFile:
     odd = text.of_kind(holds_odd)
     called = ir.Instruction | CompactIf
     for row in text.of_kind(lambda s: not (isinstance(s, called) or holds_odd(s))):
-        one = text.statement(row)
-        if isinstance(one, ModuleHead | RecordHead):
-            outline.begin(
-                "module" if isinstance(one, ModuleHead) else "record", row, one
-            )
-        else:
-            outline.take(row, one, outline.name("module"))
+        outline.take(row, text.statement(row), outline.name("module"))
     outline.close()
     # Without its end, calls may stand behind a record.
     ended = (r for r in outline.of("record") if r.ended)
@@ -99,11 +91,7 @@ def read_rapid(source: Source) -> RapidFile:
         outline.complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
     for row in (row for row in odd if row not in within):
         outline.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
-    return RapidFile(
-        text, tuple(outline.of(*_ROUTINES)), tuple(outline.data),
-        np.array(moves, dtype=np.int32), tuple(sorted({*outline.diagnostics})),
-        tuple(outline.of("module")),
-    )  # fmt: skip
+    return RapidFile(**outline.parts(moves), modules=tuple(outline.of("module")))
 
 
 def inside(one: ir.SourceStatement) -> ir.SourceStatement:

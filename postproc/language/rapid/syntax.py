@@ -8,26 +8,6 @@ from postproc.language.ir import Argument, DataObject, Operand, SourceStatement
 
 
 @dataclass(frozen=True, slots=True)
-class FileHeader(SourceStatement):
-    """``%%% VERSION:1 LANGUAGE:ENGLISH %%%``."""
-
-
-@dataclass(frozen=True, slots=True)
-class ModuleHead(SourceStatement):
-    """``MODULE name(SYSMODULE, ..)``."""
-
-    name: str
-    attributes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class RecordHead(SourceStatement):
-    """``RECORD name``."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
 class TypeAlias(SourceStatement):
     """``ALIAS type name``."""
 

@@ -21,9 +21,9 @@ from postproc.language.rapid.moves import (
     RapidVisit,
     pose_of_numbers,
 )
-from postproc.language.rapid.pose_encoding import RAPID_DIALECT
+from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
 from postproc.language.shifts import Pose
-from postproc.language.visits import Meaning
+from postproc.language.visits import Blend, Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -47,13 +47,12 @@ _SHIFT = Reason(
 class RapidCollector(to_visits.TaskCollector):
     """Makes the visits of a RAPID task."""
 
-    dialect = RAPID_DIALECT
+    dialect, comments = RAPID_DIALECT, COMMENTS
 
     def __init__(self, machine: RapidMachine) -> None:
-        """Find where the arm may stop although a zone is written."""
+        """Place the arm as the cell says."""
         super().__init__(machine)
         self.base = cell_pose(machine.task.start.base)
-        self.paused = {id(machine.visits[k]) for k in machine.find_unsure_stops()}
         self.placed: dict[tuple[TaskFrame, Pose], Pose] = {}
 
     def arrive(self, v: RapidVisit) -> Arrival:
@@ -64,15 +63,14 @@ class RapidCollector(to_visits.TaskCollector):
             if pose and v.modes.shift != NO_SHIFT:
                 pose = compose_poses(pose, pose_of_numbers(v.modes.shift))
             self.placed[key] = pose
-        paused = id(v) in self.paused
-        conditions = _conditions(v, self.base, self.placed[key], paused)
-        return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE)
+        conditions = _conditions(v, self.base, self.placed[key])
+        flies = conditions.zone.blend != Blend.UNSET
+        return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE, flies)
 
 
-def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Conditions:
+def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
     """Say what an arrival is carried out with."""
     joint = v.motion == Motion.JOINT
-    unsized = v.zone_mm == UNKNOWN_ZONE or (paused and v.zone_mm >= 0.0)
     return Conditions(
         tool=v.tool.pose,
         base=base,
@@ -81,7 +79,7 @@ def _conditions(v: RapidVisit, base: Pose, uframe: Pose, paused: bool) -> Condit
         tool_remote=v.tool.remote or v.wobj.remote,
         care=(v.modes.confj if joint else v.modes.confl,) * 3,
         orientation_law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
-        zone=zone_at(v.via, v.zone_mm, unsized=unsized),
+        zone=zone_at(v.via, v.zone_mm, unsized=v.zone_mm == UNKNOWN_ZONE),
         linear=v.speed,
         wrist_joint=bool(v.modes.wrist) and not joint,
         override=v.modes.override if v.modes.override > 0.0 else 1.0,

@@ -6,6 +6,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+import numpy as np
+
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language import ir
@@ -81,7 +83,7 @@ class Outline:
         match one:
             case ir.Declaration():
                 self.data += list_data(one, row, module, self.routine)
-            case ir.RoutineHead(kind=kind):
+            case ir.ScopeHead(kind=kind) | ir.RoutineHead(kind=kind):
                 self.begin(kind, row, one)
             case ir.ForLoop():
                 self.open("for", row, one)
@@ -119,6 +121,16 @@ class Outline:
     def close(self) -> None:
         """Close what the file leaves open."""
         self._close_until(0, len(self.text) - 1)
+
+    def parts(self, moves: Sequence[int]) -> dict[str, Any]:
+        """Return what every `TaskFile` holds, its moves at these rows."""
+        return {
+            "text": self.text,
+            "routines": tuple(self.of(*self.words.routines)),
+            "data": tuple(self.data),
+            "moves": np.array(moves, dtype=np.int32),
+            "diagnostics": tuple(sorted({*self.diagnostics})),
+        }
 
     def _end(self, word: str, row: int, kinds: Sequence[str]) -> None:
         kind, scopes = self.words.ends[word], self.words.scopes

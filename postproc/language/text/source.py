@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -328,37 +330,27 @@ def compose(first: Iterable[Edit], second: Iterable[Edit]) -> list[Edit]:
     >>> apply(data, compose(first, second))
     b'p := 2.0 q := 3.0'
     """
-    later = sorted(second, key=lambda edit: edit.span)
-    found: list[Edit] = []
-    at, shift = 0, 0  # of `later`; from the first text to what comes out
+    later = deque(sorted(second, key=lambda edit: edit.span))
+    found, shift = list[Edit](), 0  # from the first text to what comes out
+
+    def take_over(until: float) -> None:
+        while later and later[0].span.end <= until:
+            (a, b), text = later.popleft()
+            found.append(Edit(Span(a - shift, b - shift), text))
+
     for (start, end), new in sorted(first, key=lambda edit: edit.span):
         begin = start + shift
-        at += _take_over(later, at, begin, shift, found)
+        take_over(begin)
         inside = []
-        while at < len(later) and later[at].span.start < begin + len(new):
-            (a, b), text = later[at]
+        while later and later[0].span.start < begin + len(new):
+            (a, b), text = later.popleft()
             if a < begin or b > begin + len(new):
                 raise ValueError("an edit reaches over the border of another")
             inside.append(Edit(Span(a - begin, b - begin), text))
-            at += 1
         found.append(Edit(Span(start, end), apply(new, inside)))
         shift += len(new) - (end - start)
-    _take_over(later, at, None, shift, found)
+    take_over(math.inf)
     return found
-
-
-def _take_over(
-    edits: list[Edit], at: int, until: int | None, shift: int, found: list[Edit]
-) -> int:
-    """Take over the edits that end before an offset; return how many."""
-    count = 0
-    for k in range(at, len(edits)):
-        (start, end), new = edits[k]
-        if until is not None and end > until:
-            break
-        found.append(Edit(Span(start - shift, end - shift), new))
-        count += 1
-    return count
 
 
 # New text in a file's own layout: line ends and lengths.

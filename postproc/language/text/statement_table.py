@@ -83,6 +83,11 @@ class Statements(Generic[T]):
         rows = first + np.flatnonzero(np.array(passed, dtype=bool)[number])
         return [*rows.tolist()]
 
+    @property
+    def end_line(self) -> Indices:
+        """1-based line up to which what stands before a statement counts, (n,)."""
+        return self.begin_line
+
     def line(self, row: int) -> int:
         """Return the 1-based line that a statement begins on."""
         return int(self.begin_line[row])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import count
 from typing import Any
 
@@ -39,7 +40,7 @@ class ReservedWordError(Exception):
     """A word of the language stands where a name must."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FormParser:
     """Parses forms with a grammar, and builds what its rules say.
 
@@ -55,8 +56,8 @@ class FormParser:
     grammar: str
     rules: Mapping[str, Callable[[Children], Any]]
     reserved: Collection[str]
-    longest: int
-    deepest: int
+    longest: int = 1 << 18  # arrays of a thousand targets have 60,000
+    deepest: int = 200
     start: str = "statement"
 
     def parse(self, form: str) -> object:
@@ -68,6 +69,7 @@ class FormParser:
         except (lark.exceptions.LarkError, DeeperError, ReservedWordError):
             return FAILED
 
+    @lru_cache(maxsize=16384)  # noqa: B019 - there is one for each grammar
     def parse_statement(self, form: str) -> SourceStatement:
         """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
         found = self.parse(form)

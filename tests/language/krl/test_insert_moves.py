@@ -110,7 +110,8 @@ def test_pieces_of_an_arc_stand_before_it_and_it_is_the_last() -> None:
     ]
 
 
-def test_an_arc_through_a_named_point_is_not_cut() -> None:
-    splitter = Krl().splitter([source("CIRC r,p")])
+@pytest.mark.parametrize("via", ["r", "r[2]"])
+def test_an_arc_through_a_named_point_is_not_cut(via: str) -> None:
+    splitter = Krl().splitter([source(f"CIRC {via},p")])
     with pytest.raises(CloneError, match="on its way"):
         splitter.arc(0, LINE, [ArcPiece(None, None, True)], np.zeros(8), "", False)

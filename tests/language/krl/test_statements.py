@@ -96,12 +96,12 @@ def given_as(name, way="in"):
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        ("&ACCESS RVP", said.AccessHeader()),
+        ("&ACCESS RVP", ir.SourceStatement()),
         ("GLOBAL DEF Weld1(a :IN, b[] :OUT)",
          ir.RoutineHead("def", "weld1", (given_as("a"), given_as("b", "out")))),
         ("deffct real f ( )", ir.RoutineHead("deffct", "f", (), True)),
-        ("DEFDAT $CONFIG", said.DataList("$config")),
-        ("DEFDAT m PUBLIC", said.DataList("m")),
+        ("DEFDAT $CONFIG", ir.ScopeHead("defdat", "$config")),
+        ("DEFDAT m PUBLIC", ir.ScopeHead("defdat", "m")),
         ("END", ir.BlockWord("end")),
         ("ENDSWITCH", ir.BlockWord("endtest")),
         ("DECL GLOBAL CONST INT N=3", ir.Declaration(
@@ -109,8 +109,8 @@ def given_as(name, way="in"):
         ("INT i, j[4]", ir.Declaration("int", (
             ir.DeclaredItem("i"), ir.DeclaredItem("j", (ir.Num(0),))))),
         ("ASYPTP XP1", ir.NotUnderstood()),
-        ("EXT weld(REAL :IN)", said.OutsideName()),
-        ("GLOBAL ENUM kind a, b", said.OutsideName()),
+        ("EXT weld(REAL :IN)", ir.SourceStatement()),
+        ("GLOBAL ENUM kind a, b", ir.SourceStatement()),
         ("CONTINUE", said.ContinueWord()),
         ("WAIT SEC 0.5", said.Waiting(ir.Num(0))),
         ("HALT", said.Waiting()),

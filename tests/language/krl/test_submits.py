@@ -152,8 +152,8 @@ def test_routines_of_submit_programs_are_not_called():
     assert "motion-unknown" in codes(found)
 
 
-def find_shared(program, *given):
-    return KrlFileName(str(program)).find_shared(*given)
+def find_shared(program, root=None):
+    return KrlFileName(str(program)).find_shared(FolderListing(root))
 
 
 BAS = b"&ACCESS R\r\nDEF  BAS (COMMAND :IN,REAL_PAR :IN )\r\nEND\r\n"
@@ -198,8 +198,9 @@ def test_an_archive_is_walked_once_for_all_its_programs(tmp_path, monkeypatch):
         once = getattr(Path, name)
         monkeypatch.setattr(Path, name, lambda self, *given, own=once: (
             walked.append((own, self)) or own(self, *given)))  # fmt: skip
-    listing = FolderListing()
-    assert [find_shared(path, tmp_path, listing) for path in programs] == alone
+    listing = FolderListing(tmp_path)
+    files = [KrlFileName(str(path)) for path in programs]
+    assert [file.find_shared(listing) for file in files] == alone
     assert len(walked) == len({*walked})
 
 

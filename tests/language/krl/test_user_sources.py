@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from postproc.files import FolderListing
 from postproc.language.krl.user_sources import acting_sources
 from tests.language.krl.test_visits import job, names, reasons
 
@@ -22,6 +23,10 @@ ACTING = {
 }
 
 
+def acting(program):
+    return acting_sources(program, FolderListing())
+
+
 def written(line):
     return f"{HEAD}{line}\nEND\n"
 
@@ -37,11 +42,11 @@ def test_what_moves_or_sets_is_read(tmp_path, place):
     program, own = tmp_path / "P/job.src", tmp_path / place
     for line in ACTING.values():
         own.write_text(written(line))
-        assert [p.name for p in acting_sources(program)] == [own.name], line
+        assert [p.name for p in acting(program)] == [own.name], line
     own.write_text(QUIET)
-    assert acting_sources(program) == ()
+    assert acting(program) == ()
     own.write_text("DEF other( )\nLIN XP1\nEND\n")
-    assert acting_sources(program) == () == acting_sources(own)
+    assert acting(program) == () == acting(own)
 
 
 COLUMNS = {"base": "uframe", "frames": "uframe", "load": "load"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from postproc.files import FolderListing
 from postproc.language.rapid.backup import read_arms, read_mounted_arms, system_modules
 from tests.golden.case import HERE
 from tests.golden.rapid_cases import DATA, go, module
@@ -74,8 +75,8 @@ def test_what_the_cell_must_add_is_listed_once(backup):
 
 def test_only_modules_that_can_be_read_belong_to_the_task(backup):
     job = backup / "RAPID" / "TASK1" / "PROGMOD" / "Job.mod"
-    assert [p.name for p in system_modules(job)] == ["user.sys"]
-    assert system_modules(backup / "Job.mod") == ()
+    assert [p.name for p in system_modules(job, FolderListing())] == ["user.sys"]
+    assert system_modules(backup / "Job.mod", FolderListing()) == ()
 
 
 def test_points_of_system_modules_keep_their_numbers(backup):

@@ -106,7 +106,8 @@ def test_pieces_of_an_arc_stand_before_it_and_it_is_the_last() -> None:
     assert Rapid().ends_at_via(second.encode())
 
 
-def test_an_arc_through_a_named_point_is_not_cut() -> None:
-    splitter = Rapid().splitter([source("MoveC r,p,v100,fine,t;")])
+@pytest.mark.parametrize("via", ["r", "r{2}"])
+def test_an_arc_through_a_named_point_is_not_cut(via: str) -> None:
+    splitter = Rapid().splitter([source(f"MoveC {via},p,v100,fine,t;")])
     with pytest.raises(CloneError, match="on its way"):
         splitter.arc(0, LINE, [ArcPiece(None, None, True)], np.zeros(11), "", False)

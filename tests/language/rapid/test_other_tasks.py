@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.program_files import ProgramFiles
+from postproc.files import FolderListing
 from postproc.language.language import Start
 from postproc.language.rapid.backup import modules_beside
 from postproc.language.rapid.language import Rapid
@@ -163,4 +164,4 @@ def test_a_backup_shows_the_other_tasks(backup, monkeypatch):
     assert [*ProgramFiles.open(program).by_name] == ["Job.mod", *names]
     monkeypatch.chdir(program.parent)
     assert [*ProgramFiles.open("Job.mod").by_name] == ["Job.mod", *names]
-    assert modules_beside(backup / "Job.mod") == ()
+    assert modules_beside(backup / "Job.mod", FolderListing()) == ()

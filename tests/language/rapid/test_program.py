@@ -106,7 +106,7 @@ def in_record(file, row):
     inside = False
     for k in range(len(file.text)):
         statement = file.text.statement(k)
-        if isinstance(statement, said.RecordHead) and k < row:
+        if getattr(statement, "kind", "") == "record" and k < row:
             inside = True
         elif inside and isinstance(statement, ir.BlockWord):
             inside = False

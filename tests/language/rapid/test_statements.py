@@ -84,7 +84,7 @@ X, P10 = ir.DataObject("x"), ir.DataObject("p10")
     ("text", "wanted"),
     [
         ("MODULE Main(SYSMODULE, NOSTEPIN)",
-         said.ModuleHead("main", ("sysmodule", "nostepin"))),
+         ir.ScopeHead("module", "main", ("sysmodule", "nostepin"))),
         ("LOCAL PROC weld1(num a, \\switch b | INOUT robtarget p{*}, \\VAR num c)",
          ir.RoutineHead("proc", "weld1", (
              given("a", type="num"), given("b", True, True),
@@ -96,7 +96,7 @@ X, P10 = ir.DataObject("x"), ir.DataObject("p10")
         ("FUNC robtarget near2(robtarget p)",
          ir.RoutineHead("func", "near2", (given("p", type="robtarget"),))),
         ("TRAP t_stop", ir.RoutineHead("trap", "t_stop")),
-        ("LOCAL RECORD seam", said.RecordHead("seam")),
+        ("LOCAL RECORD seam", ir.ScopeHead("record", "seam")),
         ("EndProc", ir.BlockWord("endproc")),
         ("TASK PERS num n{2, 3};",
          ir.Declaration("num", (
