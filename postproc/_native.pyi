@@ -395,15 +395,6 @@ def scan_lines(
     list[int],
 ]: ...
 
-# rescan.rs: a text that differs from one read before in numbers
-def rescan_lines(
-    before: bytes,
-    before_starts: Indices,
-    after: bytes,
-    after_starts: Indices,
-    count: int,
-) -> tuple[int, SpanColumns, Floats, Bools] | None: ...
-
 # statements.rs: statements as texts and numbers (`postproc.language.statement_table`)
 def scan_statements(
     data: bytes,

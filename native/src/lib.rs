@@ -29,7 +29,6 @@ mod numeric;
 mod play;
 mod pose;
 mod pull;
-mod rescan;
 mod rounding;
 mod rows;
 mod segments;
@@ -111,7 +110,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(interned::number_in_order, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(logical::scan_logical_lines, module)?)?;
-    module.add_function(wrap_pyfunction!(rescan::rescan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_krl, module)?)?;
     module.add_function(wrap_pyfunction!(spline::splines, module)?)?;

@@ -81,13 +81,6 @@ pub struct Spans {
 pub type Columns<'py> = (Bound<'py, PyArray1<i32>>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 impl Spans {
-    /// Make room for so many numbers that stand close together.
-    pub fn for_numbers(count: usize) -> Self {
-        let mut found = Spans::default();
-        found.reserve(count);
-        found
-    }
-
     /// Make room for so many more.
     pub fn reserve(&mut self, count: usize) {
         self.base.reserve(count.div_ceil(TOGETHER));

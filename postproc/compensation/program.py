@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -52,8 +51,6 @@ class ParsedProgram:
         missed: Lines of moves that are never reached, by file.
         untouched: Names of files that are read, and never rewritten.
         begins: The first visit of every program.
-        programs: What was parsed of the files, for who reads them again with other
-            numbers.
         aims: Sides of the joints that visits are meant to be reached from, (n, 6),
             where the search for them is to begin; NaN: as planned, as all where empty.
     """
@@ -64,7 +61,6 @@ class ParsedProgram:
     cloned: tuple[tuple[Edit, ...], ...] = ()
     given: tuple[Source, ...] = ()
     begins: tuple[int, ...] = (0,)
-    programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
     aims: Floats = field(default_factory=lambda: np.empty((0, 6)))
     untouched: frozenset[str] = frozenset()
@@ -174,30 +170,24 @@ def assuming(cell: Cell, options: Options) -> Cell:
     return replace(cell, compensation=own)
 
 
-def read_program(
-    files: Mapping[str, bytes],
-    cell: Cell,
-    known: Sequence[Any] = (),
-) -> ParsedProgram:
+def read_program(files: Mapping[str, bytes], cell: Cell) -> ParsedProgram:
     """Parse a program and resolve its visits.
 
     Args:
         files: Bytes by name: first the program itself, then the programs that it
             imports, last, where there is one, its variable file.
         cell: What holds at program start.
-        known: What was parsed of the files before, see `Language.read`.
 
     Raises:
         ProgramError: A file is no program text, or the program is another arm's.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
     language = language_of(sources[0].name)
-    found = language.read(sources, start_of(cell), known)
+    found = language.read(sources, start_of(cell))
     return ParsedProgram(
         found.texts,
         with_tracks(found.visits, cell),
         found.diagnostics,
-        programs=found.programs,
         missed=found.missed,
         untouched=found.untouched,
     )

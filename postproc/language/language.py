@@ -113,7 +113,6 @@ class JobReading:
         texts: Every file as it was read, in the order of `Visits.files`.
         visits: Every arrival at a target.
         diagnostics: What else was found.
-        programs: What was parsed of the files, as `read` takes it for `known`.
         missed: Lines of moves that are never reached, by file.
         untouched: Names of files that are read, and never rewritten.
     """
@@ -121,7 +120,6 @@ class JobReading:
     texts: tuple[Skeleton, ...]
     visits: Visits
     diagnostics: tuple[Diagnostic, ...]
-    programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
     untouched: frozenset[str] = frozenset()
 
@@ -260,16 +258,12 @@ class Language(ABC):
         """Tell whether a text without a name begins as programs of this language do."""
 
     @abstractmethod
-    def read(
-        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
-    ) -> JobReading:
+    def read(self, sources: Sequence[Source], start: Start) -> JobReading:
         """Parse the files of a job and resolve its visits.
 
         Args:
             sources: First the program itself, then those that belong to it.
             start: What the cell says.
-            known: What was parsed before: what files say that are the same, or the
-                same but for numbers of targets, need not be worked out again.
 
         Raises:
             ProgramError: A file is no program text, or the program is another arm's.

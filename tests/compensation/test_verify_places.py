@@ -119,20 +119,3 @@ def test_a_stamp_may_stand_before_any_line() -> None:
         elsewhere = replace(Skeleton.read(stamped), numbers=unstamped.numbers)
         last = at > unstamped.numbers.start[-1]
         assert bool(difference(before, elsewhere, edits, span)) != last
-
-
-def test_what_was_parsed_is_not_parsed_again(cell) -> None:
-    made = spot(12)
-    files = {"spot.pdl": made.source, "spot.lsv": made.variables}
-    reading = read_program(files, cell)
-    program, _ = reading.programs
-    values = made.variables.replace(b"88.100", b"88.125")
-    again = read_program({**files, "spot.lsv": values}, cell, reading.programs)
-    assert again.programs[0] is program
-    assert not np.array_equal(again.visits.target.values, reading.visits.target.values)
-    other = made.source.replace(b"MOVE JOINT TO WP_3", b"MOVE JOINT TO WP_4")
-    again = read_program({**files, "spot.pdl": other}, cell, reading.programs)
-    assert again.programs[0] is not program
-    assert again.visits.target.names[again.visits.target.name[3]] == "WP_4"
-    (kept,) = read_program({"a.pdl": POSES}, cell).programs
-    assert len(kept.lines.value) == 0  # they are about to change

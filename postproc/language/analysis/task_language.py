@@ -7,8 +7,6 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-import numpy as np
-
 from postproc.exceptions import ProgramError
 from postproc.language.analysis.clones import TaskCloner
 from postproc.language.analysis.symbols import TaskSymbols
@@ -16,7 +14,7 @@ from postproc.language.analysis.task_machine import TaskMachine, follow
 from postproc.language.analysis.to_visits import TaskCollector
 from postproc.language.insert_moves import Splitter
 from postproc.language.language import Cloner, JobReading, Language, Start
-from postproc.language.text.blocks import check_blocks, read_once
+from postproc.language.text.blocks import check_blocks
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
 from postproc.language.text.source import Source
@@ -92,9 +90,7 @@ class TaskLanguage(Language):
         """Load the parser of statements."""
         line_parser(self.grammar, "statement")
 
-    def parse(
-        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
-    ) -> TaskSymbols[Any]:
+    def parse(self, sources: Sequence[Source], start: Start) -> TaskSymbols[Any]:
         """Parse the files of a job, see `Language.read`.
 
         Raises:
@@ -102,21 +98,18 @@ class TaskLanguage(Language):
         """
         own = [one for one in sources if not self.is_beside(one)]
         others = [one for one in sources if self.is_beside(one)]
-        files = [read_once(one, known, self.read_file) for one in own]
+        files = [self.read_file(one) for one in own]
         for file in files:
             check_blocks(file)
         if not files[0].routines:
             problem = "the file holds no routine"
             raise ProgramError(own[0].name, problem, self.cure)
         self.refuse(files)
-        beside = [read_once(one, known, self.read_file) for one in others]
-        return self.task(files, start, beside)
+        return self.task(files, start, [self.read_file(one) for one in others])
 
-    def read(
-        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
-    ) -> JobReading:
+    def read(self, sources: Sequence[Source], start: Start) -> JobReading:
         """Read the files of a job and follow it, see `Language.read`."""
-        task = self.parse(sources, start, known)
+        task = self.parse(sources, start)
         machine = follow(self.machine, task)
         collector = self.collector(machine)
         visits = collector.collect()
@@ -127,12 +120,10 @@ class TaskLanguage(Language):
         odd = (d for f in task.files if f not in quiet for d in f.diagnostics)
         told = never_reached(missed, *self.name_main(task.files))
         found = {*odd, *machine.diagnostics, *told}
-        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         files = (*task.files, *task.files_beside)
-        kept = tuple(f for f in files if f.text.source.name not in corrected)
         return JobReading(
             tuple(Skeleton.of(file.text) for file in files), visits,
-            tuple(sorted(found)), kept, missed,
+            tuple(sorted(found)), missed,
             frozenset(file.text.source.name for file in quiet),
         )  # fmt: skip
 

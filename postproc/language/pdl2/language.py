@@ -6,8 +6,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
 from postproc.files import base_name
@@ -17,7 +15,7 @@ from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.nested import name_parts
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
-from postproc.language.pdl2.program import Program, parse, parse_again
+from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
@@ -26,7 +24,6 @@ from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
 _NESTED = re.compile(rb"\s*[A-Za-z_]\w*\s+(?:A?REC|PATH)\b", re.I)
-Parsed = Program | VariableFile
 
 
 class Pdl2(Language):
@@ -48,11 +45,9 @@ class Pdl2(Language):
         """Tell that a text may be PDL2: what begins as nothing else is taken for it."""
         return True
 
-    def read(
-        self, sources: Sequence[Source], start: Start, known: Sequence[Parsed] = ()
-    ) -> JobReading:
+    def read(self, sources: Sequence[Source], start: Start) -> JobReading:
         """Parse a program, its pages and its variable file; see `Language.read`."""
-        program = _parse(sources[0], known)
+        program = parse(sources[0])
         if program.main is None and not program.routines:
             problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
             raise ProgramError(sources[0].name, problem, cure)
@@ -62,12 +57,10 @@ class Pdl2(Language):
         texts = [Skeleton.of(program.lines)]
         for source in sources[1:]:
             if Pdl2FileName(source.name).is_variables:
-                same = (v for v in known if isinstance(v, VariableFile))
-                same = (one for one in same if one.source == source)
-                variables = next(same, None) or read_variables(source)
+                variables = read_variables(source)
                 texts.append(Skeleton.of(variables.lines))
             else:
-                page = _parse(source, known)
+                page = parse(source)
                 # Where its PROGRAM line is not understood, its file names it.
                 pages.append(page if page.name else replace(page, name=_file(page)))
                 texts.append(Skeleton.of(pages[-1].lines))
@@ -77,16 +70,7 @@ class Pdl2(Language):
         visits, missed = resolved.visits, resolved.missed
         told = never_reached(missed, "the start", "program")
         found = (*resolved.diagnostics, *told)
-        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
-        kept: list[Parsed] = [
-            replace(one, lines=one.lines.without_values())
-            if one.lines.source.name in corrected
-            else one
-            for one in (program, *pages)
-        ]
-        if variables is not None and variables.source.name not in corrected:
-            kept.append(variables)
-        return JobReading(tuple(texts), visits, found, tuple(kept), missed)
+        return JobReading(tuple(texts), visits, found, missed)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""
@@ -138,16 +122,6 @@ def _refuse_other_arm(program: Program, start: Start) -> None:
         )
         name = program.lines.source.name
         raise ProgramError(name, problem, cure, line=program.head)
-
-
-def _parse(source: Source, known: Sequence[Parsed]) -> Program:
-    """Parse a file, unless it was parsed before as it is, with its numbers."""
-    for one in known:
-        if isinstance(one, Program) and one.lines.source.name == source.name:
-            whole = len(one.lines.value) == len(one.lines.numbers)
-            same = whole and one.lines.source == source
-            return one if same else parse_again(source, one)
-    return parse(source)
 
 
 def _file(program: Program) -> str:

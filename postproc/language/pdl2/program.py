@@ -18,7 +18,7 @@ from postproc.language.analysis.control_flow import ControlFlow, FlowReader
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
 from postproc.language.pdl2.pose_encoding import COMMENTS
-from postproc.language.text.logical_lines import read_lines, reread_lines
+from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
@@ -452,7 +452,7 @@ def parse(source: Source) -> Program:
         ProgramError: A string does not end on its line.
     """
     lines: ProgramLines = read_lines(source, parse_form)
-    rows = _structural(lines)
+    rows = np.flatnonzero(lines.which(lambda said: not isinstance(said, _PLAIN)))
     reader = _Reader(lines, COMMENTS.list_taught(source), rows)
     for row in rows.tolist():
         statement = lines.said.once(int(lines.shape[row]))
@@ -471,31 +471,6 @@ def parse(source: Source) -> Program:
         reader.scopes[0].variables, tuple(reader.imports), reader.arm,
         tuple(reader.diagnostics), reader.nodes,
     )  # fmt: skip
-
-
-def parse_again(source: Source, before: Program) -> Program:
-    """Parse a program that should differ from one parsed before in numbers of moves.
-
-    Where its lines say what they said, and its declarations and blocks hold the same
-    numbers, it is built as it was.
-
-    Args:
-        source: The program.
-        before: What it was.
-
-    Raises:
-        ProgramError: A string does not end on its line.
-    """
-    found = reread_lines(source, before.lines)
-    if found is None or found.change(_structural(before.lines)):
-        return parse(source)
-    told = found.move(before.diagnostics)
-    return replace(before, lines=found.lines, diagnostics=told)
-
-
-def _structural(lines: ProgramLines) -> Ints:
-    """List the rows of other statements than plain ones, ascending."""
-    return np.flatnonzero(lines.which(lambda said: not isinstance(said, _PLAIN)))
 
 
 def _close_open(reader: _Reader) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.analysis.control_flow import ENDS, HeadedRows
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
-from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
@@ -163,17 +162,6 @@ class Outline:
         """Say what is wrong with a statement."""
         message = f"{self.text.quote(row)} {what}"
         self.diagnostics.append(self.text.diagnostic(row, code, message))
-
-
-File = TypeVar("File", bound=TaskFile)
-
-
-def read_once(
-    source: Source, known: Sequence[File], read: Callable[[Source], File]
-) -> File:
-    """Read a file, unless it was read before."""
-    same = (file for file in known if file.text.source == source)
-    return next(same, None) or read(source)
 
 
 def check_blocks(file: TaskFile) -> None:
