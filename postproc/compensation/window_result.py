@@ -186,7 +186,7 @@ def example_of(width: int, turned: bool) -> WindowResult:
     one, three, six = np.zeros(1), np.zeros((1, 3)), np.zeros((1, 6))
     said, law = np.zeros(1, dtype=bool), LengthLaw(one, one, one, one)
     decisions = Decisions(
-        status=np.zeros(1, dtype=np.int8), why=np.zeros(1, dtype=np.int64),
+        status=np.zeros(1, dtype=np.int8), why=np.zeros(1, dtype=np.int32),
         reasons=(), q=six, direction=np.zeros((1, 6), dtype=np.int8), side=six,
         corrected=np.zeros((1, width)), correction=three, std_error=three,
         turn=three if turned else NONE,
