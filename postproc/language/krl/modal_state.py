@@ -276,12 +276,12 @@ class ModeReader:
                 off = self._number(value) == 0.0
                 rest = modes.blocked - {IGNORED}
                 return modes.with_(blocked=rest if off else rest | {IGNORED})
-            case "fdat_act" | "pdat_act" | "ldat_act":
-                return self._hold_component(modes, one)
             case _ if name in symbols.TABLES:
                 return self._entry(modes, one)
+            case "fdat_act" | "pdat_act" | "ldat_act":
+                return self._hold(modes, one)
             case _ if name in symbols.HELD:
-                return self._correction(modes, one)
+                return self._hold(modes, one)
         known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
         return modes if known else None
 
@@ -336,23 +336,23 @@ class ModeReader:
         found = self.frames(modes).frame(one.value)
         return None if found.why or not found.pose else found
 
-    def _correction(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
-        """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``."""
-        name, value = one.target.name, None
+    def _hold(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
+        """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``, ``FDAT_ACT = FP1``.
+
+        Where a component of ``FDAT_ACT`` is set, the others are not known.
+        """
+        name = one.target.name
+        value: object | None = None
         if one.target.steps or not self.task.is_global(name, self.here):
             return modes.hold(name, None)
         if name in symbols.SWITCHES:
             value = next((w == "true" for w in _BOOLS if is_word(one.value, w)), None)
-            return modes.hold(name, value)
-        found = self.frames(modes).frame(one.value)
-        return modes.hold(name, None if found.why else found)
-
-    def _hold_component(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
-        """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
-        name, steps = one.target.name, one.target.steps
-        known = self.task.is_global(name, self.here) and name not in self.task.beside
-        found = self.task.value(one.value, self.here) if known and not steps else None
-        return modes.hold(name, found)
+        elif name in symbols.HELD:
+            found = self.frames(modes).frame(one.value)
+            value = None if found.why else found
+        elif name not in self.task.beside:
+            value = self.task.value(one.value, self.here)
+        return modes.hold(name, value)
 
     def _number(self, operand: ir.Operand | None) -> float:
         return self.task.number(operand, self.here)

@@ -14,7 +14,6 @@ from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
 from postproc.language.analysis.assigned_points import NO_POINTS, AssignedPoint, Scope
-from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.found_goals import (
     FoundGoal,
     FoundVisit,
@@ -367,57 +366,37 @@ class KrlGoal(goals.GoalReader):
         point, other = (first, second) if behind else (second, first)
         if not isinstance(point, ir.DataObject):
             return self.unknown(goals.AT_RUN_TIME)
-        base = self.plain_goal(point)
-        own, shifts = self._find_own_shift(other), f"{base.name} is shifted by what"
-        shift = FrameReader(self.task, self.here, _NO, _NO).frame(other)
-        if base.target != Meaning.POSE or not shift.pose:
+        base, value = self.plain_goal(point), self.task.value(other, self.here)
+        record = value if isinstance(value, KnownRecord) else KnownRecord(())
+        numbers, file_of = _numbers(record, PLACE), self.task.numbering.file_of
+        written = goals.list_slots(numbers or (), pose_encoding.WIDTH)
+        here = self.here.file
+        own = frozenset(written[:1] if file_of(written[0]) == here else ())
+        shifts = f"{base.name} is shifted by what"
+        frame = FrameReader(self.task, self.here, _NO, _NO).frame(other)
+        if base.target != Meaning.POSE or not frame.pose:
             return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
-        by, slots = self._shift(base, other, shift, behind)
+        told = [n.value for n in numbers] if numbers else six_numbers(frame)
+        kind = ShiftKind.OWN if behind else ShiftKind.FRAME
+        by = Shift(kind, tuple(told), base.values, flagged=not behind)
+        # Numbers of data may serve other moves and sums too: they stay.
+        alone = isinstance(other, said.KrlAggregate) and numbers is not None
+        alone = alone and {file_of(one.slot) for one in numbers or ()} == {here}
         base = replace(base, stays=base.stays or base.slots[0] < 0)
-        aux = self._outside_of(base, other) if behind else base.aux
-        turned = f"{base.name} is turned too"
-        return self.apply_shift(
-            base, goals.ReadShift(by, slots, own, aux, shifts, turned)
-        )
+        aux = self._outside_of(base, record) if behind else base.aux
+        return self.apply_shift(base, goals.ReadShift(
+            by, written if alone else NO_SLOTS, own, aux, shifts,
+            f"{base.name} is turned too",
+        ))  # fmt: skip
 
-    def _find_own_shift(self, other: ir.Operand) -> frozenset[int]:
-        """Return where the numbers of a shift begin that stand in the move itself."""
-        value = self.task.value(other, self.here)
-        numbers = _numbers(value, PLACE) if isinstance(value, KnownRecord) else None
-        first = goals.list_slots(numbers or (), pose_encoding.WIDTH)[0]
-        own = self.task.numbering.file_of(first) == self.here.file
-        return frozenset([first] if own else [])
-
-    def _outside_of(self, base: FoundGoal, other: ir.Operand) -> tuple[float, ...]:
+    def _outside_of(self, base: FoundGoal, other: KnownRecord) -> tuple[float, ...]:
         """Return the external axes of ``point : other``: those that stand on the right.
 
         A frame says nothing of them: they stay where they are, wherever the point has
         them at 0. Where the point has them elsewhere it is left like the point itself.
         """
-        value = self.task.value(other, self.here)
-        own = self._outside(
-            value if isinstance(value, KnownRecord) else KnownRecord(())
-        )
-        pairs = zip(own, base.aux, strict=True)
+        pairs = zip(self._outside(other), base.aux, strict=True)
         return tuple(b if math.isnan(a) and b != 0.0 else a for a, b in pairs)
-
-    def _shift(
-        self, base: FoundGoal, other: ir.Operand, frame: TaskFrame, behind: bool
-    ) -> tuple[Shift, tuple[int, ...]]:
-        """Say how a point is shifted, and where the numbers of that stand.
-
-        Those of data may serve other moves and sums too: they stay.
-        """
-        value = self.task.value(other, self.here)
-        record = value if isinstance(value, KnownRecord) else KnownRecord(())
-        numbers = _numbers(record, PLACE)
-        told = [n.value for n in numbers] if numbers else six_numbers(frame)
-        kind = ShiftKind.OWN if behind else ShiftKind.FRAME
-        shift = Shift(kind, tuple(told), base.values, flagged=not behind)
-        written = numbers if isinstance(other, said.KrlAggregate) else None
-        slots = goals.list_slots(written or (), pose_encoding.WIDTH)
-        files = {self.task.numbering.file_of(one.slot) for one in written or ()}
-        return shift, slots if files == {self.here.file} else NO_SLOTS
 
     # Steps.
 
