@@ -87,9 +87,7 @@ class KrlMachine(TaskMachine):
 
     procedures = ("def",)
     reader = KrlGoal
-    passed = (
-        said.AccessHeader, ir.Declaration, said.OutsideName, said.SpeedPart,
-    )  # fmt: skip
+    passed = (ir.Declaration,)
     acting = (
         ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
         said.ContinueWord, said.InterruptSwitched, said.PathTrigger,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from typing import Any
 
 from postproc.language import ir
@@ -95,7 +94,7 @@ def _parameter(name: str, way: str = "out") -> ir.RoutineParameter:
 
 RULES: Mapping[str, Callable[[Children], Any]] = {
     **COMMON,
-    "header": lambda c: said.AccessHeader(),
+    "header": lambda c: ir.SourceStatement(),
     "procedure": _routine("def"),
     "function": _routine("deffct"),
     "data_list": lambda c: said.DataList(low(c[0])),
@@ -109,7 +108,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "halt": lambda c: said.Waiting(),
     "continue_": lambda c: said.ContinueWord(),
     "wait": lambda c: said.Waiting(c[0]),
-    "speed_part": lambda c: said.SpeedPart(),
+    "speed_part": lambda c: ir.SourceStatement(),
     "interrupt_declared": lambda c: said.InterruptDeclared(*c[-3:]),
     "interrupt_switched": _build_switch,
     "brake": lambda c: said.InterruptSwitched("brake"),
@@ -131,17 +130,14 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "field": _field,
 }
 
-LONGEST = 1 << 14  # characters of a form; a line has some hundred
-DEEPEST = 100  # operators or brackets within each other; followed by recursion
-_PARSER = FormParser("krl", RULES, said.NAMES["reserved"], LONGEST, DEEPEST)
+_parse = FormParser("krl", RULES, said.NAMES["reserved"]).statements
 
 
-@lru_cache(maxsize=8192)
 def parse_statement(form: str) -> ir.SourceStatement:
     """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
     words = form.lower().split(" ", 2)
     if words[0] == "global" and len(words) > 1:
         words = words[1:]
     if words[0] in said.NAMES["outside"] and len(words) > 1:
-        return said.OutsideName()
-    return _PARSER.parse_statement(form)
+        return ir.SourceStatement()
+    return _parse(form)

@@ -36,20 +36,10 @@ class KrlAggregate(Operand):
 
 
 @dataclass(frozen=True, slots=True)
-class AccessHeader(SourceStatement):
-    """``&ACCESS RVP`` and the like."""
-
-
-@dataclass(frozen=True, slots=True)
 class DataList(SourceStatement):
     """``DEFDAT name PUBLIC``."""
 
     name: str
-
-
-@dataclass(frozen=True, slots=True)
-class OutsideName(SourceStatement):
-    """``EXT``, ``SIGNAL``, ``ENUM``, ``STRUC``, ..: names, and nothing that runs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +52,6 @@ class Waiting(SourceStatement):
 @dataclass(frozen=True, slots=True)
 class ContinueWord(SourceStatement):
     """``CONTINUE``: the next statement does not stop what is planned ahead."""
-
-
-@dataclass(frozen=True, slots=True)
-class SpeedPart(SourceStatement):
-    """``TIME_BLOCK START``, ``CONST_VEL END = -50``: how fast a spline is run there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,10 +48,7 @@ from postproc.language.visits import START
 
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
-_PLAIN = (
-    said.FileHeader, ir.Declaration, said.ConnectTrap, ir.Assignment,
-    said.TypeAlias,
-)  # fmt: skip
+_PLAIN = (ir.Declaration, said.ConnectTrap, ir.Assignment, said.TypeAlias)
 _PASSED = (*_PLAIN, ir.SourceStatement, ir.LabelMark)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from typing import Any
 
 from postproc.language import ir
@@ -59,7 +58,7 @@ def _option(name: str, value: Any = None, passed_on: bool = False) -> ir.Argumen
 
 RULES: Mapping[str, Callable[[Children], Any]] = {
     **COMMON,
-    "header": lambda c: said.FileHeader(),
+    "header": lambda c: ir.SourceStatement(),
     "module": lambda c: said.ModuleHead(low(c[0]), tuple(map(low, c[1:]))),
     "procedure": _routine("proc"),
     "function": _routine("func"),
@@ -89,14 +88,4 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "conditional": lambda c: _option(c[0], ir.DataObject(low(c[1])), True),
 }
 
-LONGEST = 1 << 18  # characters of a form; arrays of a thousand targets have 60,000
-DEEPEST = 200  # operators or brackets within each other; followed by recursion
-
-
-_PARSER = FormParser("rapid", RULES, NAMES["reserved"], LONGEST, DEEPEST)
-
-
-@lru_cache(maxsize=8192)
-def parse_statement(form: str) -> ir.SourceStatement:
-    """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
-    return _PARSER.parse_statement(form)
+parse_statement = FormParser("rapid", RULES, NAMES["reserved"]).statements

@@ -8,11 +8,6 @@ from postproc.language.ir import Argument, DataObject, Operand, SourceStatement
 
 
 @dataclass(frozen=True, slots=True)
-class FileHeader(SourceStatement):
-    """``%%% VERSION:1 LANGUAGE:ENGLISH %%%``."""
-
-
-@dataclass(frozen=True, slots=True)
 class ModuleHead(SourceStatement):
     """``MODULE name(SYSMODULE, ..)``."""
 
