@@ -17,11 +17,7 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.control_flow import (
-    ControlFlow,
-    flow_of,
-    is_structural,
-)
+from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.goals import GoalReader
 from postproc.language.analysis.interpreter import (
@@ -173,7 +169,6 @@ class TaskMachine(Interpreter[Arrived]):
         default_factory=dict
     )
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
-    _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
     _changes: dict[tuple[int, int], frozenset[str]] = field(default_factory=dict)
     _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
@@ -269,10 +264,6 @@ class TaskMachine(Interpreter[Arrived]):
         for to in sorted(flow.joins | {end + 1 for end in flow.head}):
             self.go_on(at.to(to), here)
         self.leave(at.context, here)
-
-    def handles(self, one: ir.SourceStatement) -> bool:
-        """Tell whether the handlers of a routine begin with a statement."""
-        return False
 
     def scopes_of(
         self, routine: TaskRoutine, seen: frozenset[tuple[int, int]] = frozenset()
@@ -532,18 +523,12 @@ class TaskMachine(Interpreter[Arrived]):
 
     def _place_of(self, found: TaskRoutine, caller: At | None) -> TaskPlace:
         """Return where the statements of a routine stand that is called."""
-        file, _, routine = found
-        key, text, inside = found.key, self.texts[file], found.inside
-        if key not in self._flows:
-            rows = text.where(is_structural, inside.start, inside.stop)
-            handlers = text.where(self.handles, inside.start, inside.stop)
-            self._flows[key] = flow_of(text.statement, rows, routine, handlers)
-        scope = None
+        file, scope = found.file, None
         if caller and (call := self._call_of(found, caller)) is not None:
             scope = self._bind(found, call, scope_at(caller))
         scope = scope or self.task.scope_of(found)
         first = self.task.numbering.rows[file]
-        return TaskPlace(scope, found, self._flows[key], text, first)
+        return TaskPlace(scope, found, found.rows.flow, self.texts[file], first)
 
     def _bind(
         self, routine: TaskRoutine, call: ir.Instruction, there: Scope

@@ -11,7 +11,7 @@ from postproc.language import ir
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.program import inside
+from postproc.language.rapid.program import begins_handler, inside
 from postproc.language.rapid.symbols import SHIFTS
 from postproc.language.text.statement_table import StatementText
 
@@ -143,13 +143,6 @@ def clauses_of(
 def _read(operands: Iterable[ir.Operand | None], row: int, read: ReadNumber) -> Numbers:
     """Name the error numbers of a statement."""
     return numbers_of(operands, lambda operand: read(operand, row))
-
-
-def begins_handler(one: ir.SourceStatement) -> bool:
-    """Return True if a clause behind the statements of a routine begins."""
-    return isinstance(one, said.ErrorHandler) or (
-        isinstance(one, ir.BlockWord) and one.word in ("undo", "backward")
-    )
 
 
 def _ends(

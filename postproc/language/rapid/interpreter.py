@@ -148,10 +148,6 @@ class RapidMachine(TaskMachine):
         """Return all (None) where an error may lead to any statement."""
         return None if self._exits_of(context) else set()
 
-    def handles(self, one: ir.SourceStatement) -> bool:
-        """Tell whether a handler begins, see `TaskMachine.handles`."""
-        return errors.begins_handler(one)
-
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
         return here.blocking(_HANDLER) if self._handlers_of(context).moves else here
@@ -284,9 +280,8 @@ class RapidMachine(TaskMachine):
 
     def list_handlers(self, routine: TaskRoutine) -> Iterator[tuple[int, int, int]]:
         """Yield the rows from the first handler on."""
-        rows = routine.inside
-        heads = self.texts[routine.file].where(self.handles, rows.start, rows.stop)
-        yield from ((routine.file, row, rows.stop) for row in heads[:1])
+        if rows := routine.rows.flow.handlers:
+            yield routine.file, rows.start, rows.stop
 
     def _compact(
         self, at: At, inside: ir.SourceStatement, here: Arrived

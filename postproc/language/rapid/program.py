@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from postproc import _native
-from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import TaskFile
@@ -16,21 +15,33 @@ from postproc.language.analysis.symbols import holds_odd
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import MOTIONS
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.rapid.syntax import CompactIf, ModuleHead, RecordHead
-from postproc.language.text.blocks import INNER, BlockWords, Outline
+from postproc.language.rapid.syntax import (
+    CompactIf,
+    ErrorHandler,
+    ModuleHead,
+    RecordHead,
+)
+from postproc.language.text.blocks import Outline, ScopeWords
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
 
 _SYSTEM = "sysmodule"
 _ROUTINES = ("proc", "func", "trap")
-_WORDS = BlockWords(
-    ends={
-        **INNER, "endmodule": "module", "endproc": "proc", "endfunc": "func",
+
+
+def begins_handler(one: ir.SourceStatement) -> bool:
+    """Return True if a clause behind the statements of a routine begins."""
+    return isinstance(one, ErrorHandler) or (
+        isinstance(one, ir.BlockWord) and one.word in ("undo", "backward")
+    )
+
+
+_WORDS = ScopeWords(
+    {
+        "endmodule": "module", "endproc": "proc", "endfunc": "func",
         "endtrap": "trap", "endrecord": "record",
     },
-    scopes=("module", *_ROUTINES, "record"),
-    outer=("module",),
-    routines=_ROUTINES,
+    _ROUTINES, "module", begins_handler,
 )  # fmt: skip
 
 
@@ -96,9 +107,9 @@ def read_rapid(source: Source) -> RapidFile:
     within = {row for r in ended for row in range(r.first, r.last + 1)}
     moves = [row for row in text.where(is_move) if row not in within]
     for row in (row for row in text.where(_lacks_position) if row not in within):
-        outline.complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
+        outline.complain(row, "has too few positions")
     for row in (row for row in odd if row not in within):
-        outline.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
+        outline.complain(row, "is not understood")
     return RapidFile(
         text, tuple(outline.of(*_ROUTINES)), tuple(outline.data),
         np.array(moves, dtype=np.int32), tuple(sorted({*outline.diagnostics})),

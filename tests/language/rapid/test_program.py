@@ -177,8 +177,8 @@ def test_a_milling_job_has_one_shape():
     ("body", "code", "text"),
     [
         ("IF a THEN MoveL p1,v1,z1,t;", "open-block", "'IF a THEN' has no ENDIF"),
-        ("ENDFOR", "open-block", "'ENDFOR' ends no FOR"),
-        ("CASE 1:", "open-block", "'CASE 1:' stands in no TEST"),
+        ("ENDFOR", "open-block", "this ENDFOR closes or divides no"),
+        ("CASE 1:", "open-block", "this CASE closes or divides no block"),
         ("MoveC p1;", "unknown-statement", "'MoveC p1;' has too few positions"),
         ("MoveL p1 v1;", "unknown-statement", "'MoveL p1 v1;' is not understood"),
     ],
