@@ -299,6 +299,13 @@ class TaskSymbols(ABC, Generic[F]):
         return frozenset(datum.name for datum in self.every_datum)
 
     @cached_property
+    def loop_variables(self) -> frozenset[str]:
+        """Names of all variables of loops."""
+        texts = (file.text for file in self.files)
+        rows = ((text, text.of_kind(_is_loop)) for text in texts)
+        return frozenset(text.statement(k).name for text, own in rows for k in own)
+
+    @cached_property
     def taught_lines(self) -> Sequence[frozenset[int]]:
         """Lines of every file that a comment marks as taught."""
         return [self.comments.list_taught(file.text.source) for file in self.files]
@@ -865,6 +872,10 @@ def _names_data(one: ir.SourceStatement) -> bool:
     """Return True unless a statement declares data whose values name none."""
     values = ir.walk(one) if isinstance(one, ir.Declaration) else [ir.DataObject("")]
     return any(isinstance(part, ir.DataObject | ir.FunctionCall) for part in values)
+
+
+def _is_loop(one: ir.SourceStatement) -> bool:
+    return isinstance(one, ir.ForLoop)
 
 
 def holds_odd(one: ir.SourceStatement) -> bool:

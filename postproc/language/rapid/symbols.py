@@ -234,12 +234,6 @@ class RapidTask(TaskSymbols[RapidFile]):
         return frozenset(o.name for o in found if isinstance(o, ir.Instruction))
 
     @cached_property
-    def loop_variables(self) -> frozenset[str]:
-        """Names of all variables of loops."""
-        found = (one for file in self.files for one in file.text.said.said)
-        return frozenset(o.name for o in found if isinstance(o, ir.ForLoop))
-
-    @cached_property
     def twins(self) -> frozenset[str]:
         """Names of points beside which the controller keeps their originals."""
         pairs = {name for name in self.declared if f"o_{name}" in self.declared}
