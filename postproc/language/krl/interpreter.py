@@ -38,7 +38,6 @@ from postproc.language.krl.symbols import (
     HELD,
     STILL,
     KrlTask,
-    list_calls,
     package_routines,
 )
 from postproc.language.visits import START
@@ -96,7 +95,7 @@ class KrlMachine(TaskMachine):
     task: KrlTask = field(kw_only=True)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
-    _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _changed: dict[tuple[int, int, int], frozenset[str]] = field(default_factory=dict)
     _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     def run(self) -> None:
@@ -138,37 +137,21 @@ class KrlMachine(TaskMachine):
     def counts_alone(self, at: At, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
 
-        A variable that is not the routine's own may be changed by routines that the
-        loop calls, and by what runs beside it.
+        One that is not the routine's own may be changed by routines that the loop
+        calls, and by what runs beside it.
         """
-        key = at.place.scope.file, at.row
-        if key not in self._alone:
-            self._alone[key] = self._counts_alone(at, one)
-        return self._alone[key]
-
-    def _counts_alone(self, at: At, one: ir.ForLoop) -> bool:
-        """Read a loop once for `counts_alone`."""
-        rows = range(at.row + 1, at.place.flow.loops.get(at.row, at.row))
-        text = self.texts[at.place.scope.file]
-        inside = [text.statement(k) for k in rows]
-        changed = {
-            data.name for other in inside for data in self.task.list_changes(other)
-        }
-        changed |= {other.name for other in inside if isinstance(other, ir.ForLoop)}
-        if one.name in changed:
-            return False
-        if one.name in self.task.odd_words:
-            return False
-        scope = at.place.scope
-        place = self.task.place(one.name, scope)
-        if place and place[1:3] == (scope.module, scope.routine):
-            return True
-        if one.name in self.task.beside:
-            return False
-        others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
-        called = set[str]().union(*map(list_calls, inside))
-        calls_own = not called.isdisjoint(self.task.routines)
-        return not (others and (self._has_interrupts or calls_own))
+        scope, behind = at.place.scope, at.place.flow.loops.get(at.row, at.row)
+        key = scope.file, at.row + 1, behind
+        if key not in self._changed:
+            text, changes = self.texts[scope.file], self.task.list_changes
+            own = (changes(text.statement(row)) for row in range(at.row + 1, behind))
+            changed = frozenset(data.name for some in own for data in some)
+            place = self.task.place(one.name, scope)
+            if place is None or place[2] != scope.routine:
+                changed |= self._list_changes({key}) | self.task.volatile
+                changed |= self.task.beside
+            self._changed[key] = changed | self.task.odd_words
+        return one.name not in self._changed[key]
 
     @cached_property
     def _has_interrupts(self) -> bool:

@@ -129,7 +129,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
         """Leave variables of the system, and of loops."""
-        own = not (name.startswith("$") or name in self.counted)
+        own = not (name.startswith("$") or name in self.loop_variables)
         return own and super().is_followed(name, datum, here)
 
     def fits(self, type_: str, component: str, value: float) -> bool:
@@ -166,23 +166,6 @@ class KrlTask(TaskSymbols[KrlFile]):
             text = "may be changed by the program: it is known only when that runs"
             return code, text
         return Code.NO_VALUE, "has no value that is known before the program runs"
-
-    @cached_property
-    def assigned(self) -> frozenset[str]:
-        """Names of data that statements other than loops may change."""
-        programs = (file for file in self.files if file.routines)
-        said_ones = (one for file in programs for one in file.text.said)
-        changed = (data for one in said_ones for data in self.list_changes(one))
-        return frozenset(data.name for data in changed) | self.beside | self.odd_words
-
-    @cached_property
-    def counted(self) -> Counter[str]:
-        """Names of the variables of loops, and how many loops count each."""
-        found = Counter[str]()
-        for text in (file.text for file in self.files):
-            rows = text.of_kind(lambda one: isinstance(one, ir.ForLoop))
-            found.update(text.statement(row).name for row in rows)
-        return found
 
     @cached_property
     def odd_words(self) -> frozenset[str]:
@@ -428,6 +411,9 @@ class _KrlUses(NamesUsed):
                 self.take(angle)
             case said.SplineBlock():
                 pass
+            case ir.ForLoop(name=name):
+                self.targets.append(ir.DataObject(name))
+                super().note(one)
             case _:
                 super().note(one)
         if isinstance(one, said.KrlMove | said.SplineBlock):
