@@ -205,10 +205,6 @@ class TaskMachine(Interpreter[Arrived]):
         """Return what a statement may do to moves, but for what it calls."""
 
     @abstractmethod
-    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
-        """Return the names of what a statement calls where it runs."""
-
-    @abstractmethod
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
 
@@ -232,13 +228,14 @@ class TaskMachine(Interpreter[Arrived]):
         """Return rows that are read by themselves, None where all are."""
         return set()
 
-    def inside(self, one: ir.SourceStatement) -> ir.SourceStatement:
-        """Return what a statement does: what stands behind its condition, or itself."""
-        return one
-
     def is_asked(self, part: ir.Node) -> bool:
         """Return True if it counts that a statement asks for something as it runs."""
         return isinstance(part, ir.FunctionCall)
+
+    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
+        """Return the names of what a statement calls where it runs."""
+        return [part.name for part in self.task.values_of(one)
+                if isinstance(part, ir.Instruction | ir.FunctionCall)]  # fmt: skip
 
     def list_asked(self, one: ir.SourceStatement) -> Sequence[Any]:
         """List what a statement asks for as it runs, of what counts."""
@@ -293,7 +290,7 @@ class TaskMachine(Interpreter[Arrived]):
         found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
         for routine in self.task.every_routine:
             for row in routine.inside:
-                one = self.inside(self.texts[routine.file].statement(row))
+                one = ir.inside(self.texts[routine.file].statement(row))
                 if isinstance(one, ir.Instruction):
                     found[one.name].append((routine, row, one))
         return found
@@ -324,7 +321,7 @@ class TaskMachine(Interpreter[Arrived]):
             scope: Where it stands.
             here: How the arm comes to it, None where that does not count.
         """
-        one = self.inside(one)
+        one = ir.inside(one)
         if not self.is_move(one):
             return ()
         modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
@@ -564,7 +561,7 @@ class TaskMachine(Interpreter[Arrived]):
         """
         if not found.rows.head.parameters:
             return None
-        call = self.inside(caller.statement)
+        call = ir.inside(caller.statement)
         if not isinstance(call, ir.Instruction) or call.name != found.rows.head.name:
             return None
         return None if self._is_recursive(found) else call

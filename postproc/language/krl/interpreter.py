@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -502,15 +502,11 @@ class KrlMachine(TaskMachine):
         modal = any(_is_modal(data.name) for data in self.task.list_changes(one))
         return frozenset([MOVES] if modal else [])
 
-    def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
-        """Yield functions and the instruction; of a trigger what it does."""
-        parts = (
-            ir.walk(one.action)
-            if isinstance(one, said.PathTrigger)
-            else self.task.values_of(one)
-        )
-        calls = ir.Instruction | ir.FunctionCall
-        yield from (part.name for part in parts if isinstance(part, calls))
+    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
+        """Return functions and the instruction; of a trigger what it does."""
+        if isinstance(one, said.PathTrigger):
+            one = one.action
+        return super().names_called(one)
 
     def is_still(self, name: str) -> bool:
         """Return True for known routines and functions, and by the cell."""

@@ -16,7 +16,6 @@ from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import MOTIONS
 from postproc.language.rapid.parser import parse_statement
 from postproc.language.rapid.syntax import (
-    CompactIf,
     ErrorHandler,
     ModuleHead,
     RecordHead,
@@ -92,7 +91,7 @@ def read_rapid(source: Source) -> RapidFile:
     text = read_statements(source)
     outline = Outline(text, _WORDS)
     odd = text.of_kind(holds_odd)
-    called = ir.Instruction | CompactIf
+    called = ir.Instruction | ir.CompactIf
     for row in text.of_kind(lambda s: not (isinstance(s, called) or holds_odd(s))):
         one = text.statement(row)
         if isinstance(one, ModuleHead | RecordHead):
@@ -117,22 +116,15 @@ def read_rapid(source: Source) -> RapidFile:
     )  # fmt: skip
 
 
-def inside(one: ir.SourceStatement) -> ir.SourceStatement:
-    """Return the statement behind a condition, the statement itself without one."""
-    while isinstance(one, CompactIf):
-        one = one.statement
-    return one
-
-
 def is_move(one: ir.SourceStatement) -> bool:
     """Return True if a statement moves, also behind a condition."""
-    one = inside(one)
+    one = ir.inside(one)
     return isinstance(one, ir.Instruction) and one.name in MOTIONS
 
 
 def _lacks_position(one: ir.SourceStatement) -> bool:
     """Return True for a move that says no destination, or no point of an arc."""
-    one = inside(one)
+    one = ir.inside(one)
     if not (isinstance(one, ir.Instruction) and is_move(one)):
         return False
     to, via = MOTIONS[one.name].operands(one.arguments)

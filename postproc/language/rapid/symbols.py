@@ -34,7 +34,7 @@ from postproc.language.rapid.instructions import (
     read_controller_data,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
-from postproc.language.rapid.program import RapidFile, inside
+from postproc.language.rapid.program import RapidFile
 from postproc.language.shifts import Shift, ShiftKind
 
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
@@ -223,14 +223,14 @@ class RapidTask(TaskSymbols[RapidFile]):
     @cached_property
     def calls_by_text(self) -> bool:
         """Whether a procedure is called by a name in a text."""
-        found = (inside(one) for file in self.files for one in file.text.said.said)
+        found = (ir.inside(one) for file in self.files for one in file.text.said.said)
         late = any(isinstance(one, said.LateCall) for one in found)
         return late or bool({BY_NAME, *SYNCHRONOUS} & self.find_calls)
 
     @cached_property
     def find_calls(self) -> frozenset[str]:
         """Names of all instructions."""
-        found = (inside(one) for file in self.files for one in file.text.said.said)
+        found = (ir.inside(one) for file in self.files for one in file.text.said.said)
         return frozenset(o.name for o in found if isinstance(o, ir.Instruction))
 
     @cached_property

@@ -108,7 +108,7 @@ X, P10 = ir.DataObject("x"), ir.DataObject("p10")
         ("IF x = 1 OR NOT y THEN", ir.Branch("if", (ir.Operation("OR", (
             ir.Operation("=", (X, ir.Num(0))),
             ir.Operation("NOT", (ir.DataObject("y"),)))),))),
-        ("IF x p10:=x;", said.CompactIf(X, ir.Assignment(P10, X))),
+        ("IF x p10:=x;", ir.CompactIf(X, ir.Assignment(P10, X))),
         ("FOR i FROM 1 TO 5 STEP -1 DO", ir.ForLoop("i", ir.Num(0), ir.Num(1),
             ir.Operation("-", (ir.Num(2),)))),
         ("WHILE x<2 DO",
