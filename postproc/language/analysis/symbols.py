@@ -310,6 +310,13 @@ class TaskSymbols(ABC, Generic[F]):
         """Lines of every file that a comment marks as taught."""
         return [self.comments.list_taught(file.text.source) for file in self.files]
 
+    def is_taught(self, name: str, file: int, row: int) -> bool:
+        """Return True if data of a statement were taught, by the cell or a comment."""
+        lines = self.files[file].text.lines(row)
+        return name in self.start.taught or not self.taught_lines[file].isdisjoint(
+            lines
+        )
+
     # What statements change and take.
 
     @cached_property

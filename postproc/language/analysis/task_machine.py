@@ -146,6 +146,7 @@ class TaskMachine(Interpreter[Arrived]):
         acting: Statements that move, call, or change what moves are made with; they
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
+        still: Names of what is known not to move, nor to change how moves are made.
         reader: Reads where moves lead.
         task: What its names mean.
         diagnostics: What else was found.
@@ -157,6 +158,7 @@ class TaskMachine(Interpreter[Arrived]):
     procedures: ClassVar[Collection[str]]
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
+    still: ClassVar[Collection[str]]
     reader: ClassVar[type[GoalReader]]
     task: TaskSymbols[Any] = field(kw_only=True)
     diagnostics: set[Diagnostic] = field(default_factory=set)
@@ -204,9 +206,9 @@ class TaskMachine(Interpreter[Arrived]):
     def own_effects(self, one: ir.SourceStatement) -> Effects:
         """Return what a statement may do to moves, but for what it calls."""
 
-    @abstractmethod
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
+        return name in self.still or self.declares_motionless(name)
 
     @abstractmethod
     def is_move(self, one: ir.SourceStatement) -> bool:
@@ -455,17 +457,10 @@ class TaskMachine(Interpreter[Arrived]):
         self.run_named_beside(name)
         return self.unknown(at, here, "names several routines")
 
-    def call_function(self, at: At, name: str, still: bool, here: Arrived) -> Arrived:
-        """Allow for what a function does.
-
-        Args:
-            at: Where the call stands.
-            name: Of the function.
-            still: It is known not to move, if it is none of the task.
-            here: How the arm comes to it.
-        """
+    def call_function(self, at: At, name: str, here: Arrived) -> Arrived:
+        """Allow for what a function does."""
         found = self.task.routine(name, at.place.scope)
-        what = ""
+        what, still = "", TaskMachine.is_still(self, name)
         if found is None and (name in self.task.routines or not still):
             what = f"calls the function {name}, which is not known: it may move"
         elif found is not None and self.routine_effects(found):
@@ -504,28 +499,25 @@ class TaskMachine(Interpreter[Arrived]):
             caller: Where the call stands, None where nothing calls it.
             here: How the arm comes to it.
         """
-        (file, module, routine), rows = found, self.task.numbering.rows
-        at = rows[file] + routine.first if caller is None else caller.job_row
-        around = self.root if caller is None else caller.context
+        (file, module, routine), task = found, self.task
+        at, around = task.numbering.rows[file] + routine.first, self.root
+        call, points = None, here.points
+        if caller is not None:
+            at, around = caller.job_row, caller.context
+            call = self._call_of(found, caller)
         context = around.find(at, CALLED)
         if context is None:
-            context = around.within(at, CALLED, self._place_of(found, caller))
-        own = self.task.unit(file), module, context.place.scope.routine
-        points = here.points.leave(own)  # declared anew
-        if caller and (call := self._call_of(found, caller)) is not None:
-            there = scope_at(caller, here)
-            points = self.task.hand_over(points, found, call, there)
+            bound = call and caller and self._bind(found, call, scope_at(caller))
+            text, first = self.texts[file], task.numbering.rows[file]
+            scope = bound or task.scope_of(found)
+            place = TaskPlace(scope, found, routine.flow, text, first)
+            context = around.within(at, CALLED, place)
+        own = task.unit(file), module, context.place.scope.routine
+        points = points.leave(own)  # declared anew
+        if call and caller:
+            points = task.hand_over(points, found, call, scope_at(caller, here))
         here = here.with_points(points)
         self.enter(At(context, context.place.flow.first), self.at_call(context, here))
-
-    def _place_of(self, found: TaskRoutine, caller: At | None) -> TaskPlace:
-        """Return where the statements of a routine stand that is called."""
-        file, scope = found.file, None
-        if caller and (call := self._call_of(found, caller)) is not None:
-            scope = self._bind(found, call, scope_at(caller))
-        scope = scope or self.task.scope_of(found)
-        first = self.task.numbering.rows[file]
-        return TaskPlace(scope, found, found.rows.flow, self.texts[file], first)
 
     def _bind(
         self, routine: TaskRoutine, call: ir.Instruction, there: Scope

@@ -86,6 +86,7 @@ class KrlMachine(TaskMachine):
 
     procedures = ("def",)
     reader = KrlGoal
+    still = STILL | FUNCTIONS
     passed = (ir.Declaration,)
     acting = (
         ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -277,11 +278,8 @@ class KrlMachine(TaskMachine):
         """Allow for what a statement reads, and for what its functions do."""
         for part in self.list_asked(one):
             if isinstance(part, ir.FunctionCall):
-                name = part.name
-                still = name in FUNCTIONS or name in STILL
-                still = still or self.declares_motionless(name)
-                after = self.call_function(at, name, still, here)
-                own = name in self.task.routines
+                after = self.call_function(at, part.name, here)
+                own = part.name in self.task.routines
                 here = _halt(here, None) if own and after is here else after
             else:
                 given = isinstance(one, ir.Assignment) and part is one.target
@@ -509,10 +507,9 @@ class KrlMachine(TaskMachine):
         return super().names_called(one)
 
     def is_still(self, name: str) -> bool:
-        """Return True for known routines and functions, and by the cell."""
-        known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
+        """Add the shipped list of routines of packages."""
         listed = name in package_routines() and not self._is_overruled(name)
-        return known or listed
+        return listed or super().is_still(name)
 
 
 def _is_modal(name: str) -> bool:

@@ -326,11 +326,6 @@ class KrlTask(TaskSymbols[KrlFile]):
         points = (one for one in self.every_datum if one.type in POSITIONS)
         return frozenset(one.name for one in points)
 
-    def is_taught(self, name: str, file: int, row: int) -> bool:
-        """Return True if data of a statement were taught, by the cell or a comment."""
-        line = self.files[file].text.line(row)
-        return name in self.start.taught or line in self.taught_lines[file]
-
     # Values.
 
     def build(self, operand: ir.Operand, here: Scope, depth: int) -> Value | None:

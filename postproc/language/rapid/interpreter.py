@@ -25,6 +25,7 @@ from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
     BY_NAME,
     MOTIONS,
+    NAMES,
     STILL_FUNCTIONS,
     SYNCHRONOUS,
     WAITING,
@@ -62,6 +63,7 @@ class RapidMachine(TaskMachine):
 
     procedures = ("proc",)
     reader = RapidGoal
+    still = NAMES["still"] | HARMLESS | STILL_FUNCTIONS
     acting = (ir.Instruction,)
     passed = (ir.Declaration, said.ConnectTrap, ir.Assignment, said.TypeAlias)
     task: RapidTask = field(kw_only=True)
@@ -374,8 +376,7 @@ class RapidMachine(TaskMachine):
         for name in (call.name for call in self.list_asked(one)):
             if name in WAITING and name not in self.task.routines:
                 self.pause(here)
-            still = name in STILL_FUNCTIONS or self.declares_motionless(name)
-            here = self.call_function(at, name, still, here)
+            here = self.call_function(at, name, here)
         self._fail(at, one, here)
         return here
 
@@ -392,11 +393,6 @@ class RapidMachine(TaskMachine):
         one = ir.inside(one)
         if isinstance(one, ir.Instruction) and one.name in SYNCHRONOUS:
             yield from map(_name_procedure, filter(_is_text, one.values))
-
-    def is_still(self, name: str) -> bool:
-        """Return True for known instructions and functions, and by the cell."""
-        known = read_known_instructions().get(name) == "still" or name in HARMLESS
-        return known or name in STILL_FUNCTIONS or self.declares_motionless(name)
 
 
 _NO_MAIN = (

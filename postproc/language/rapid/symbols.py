@@ -135,25 +135,6 @@ class RapidTask(TaskSymbols[RapidFile]):
         bound = super().bind(routine, call, there)
         return self.scope_of(routine) if self.sets_by_string and bound else bound
 
-    def is_taught(self, name: str, found: Value | None) -> bool:
-        """Return True if data were taught, by the cell or a comment on their line.
-
-        Args:
-            name: Of the data, with an index where it has one; "" for numbers in a move.
-            found: What they hold.
-        """
-        if name.split("{")[0].strip().lower() in self.start.taught:
-            return True
-        one = found
-        while isinstance(one, tuple) and one:
-            one = next((part for part in one if isinstance(part, tuple)), one[0])
-        if not isinstance(one, WrittenNumber) or one.slot < 0:
-            return False
-        file = self.numbering.file_of(one.slot)
-        text = self.files[file].text
-        row = text.row_of(one.slot - self.numbering.first[file])
-        return not self.taught_lines[file].isdisjoint(text.lines(row))
-
     # What other tasks do: global persistents of one name are the same data.
 
     @cached_property
