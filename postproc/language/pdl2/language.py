@@ -75,18 +75,18 @@ class Pdl2(Language):
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
         release_memory(sum(len(text.numbers) for text in texts))
-        resolved = resolve(program, start, variables, others)
-        visits, missed = resolved.visits, resolved.missed
-        told = never_reached(missed, "the start", "program")
-        found = (*resolved.diagnostics, *told)
+        found = resolve(program, start, variables, others)
+        told = never_reached(found.missed, "the start", "program")
         files: list[Parsed] = [program, *pages]
         files += [] if variables is None else [variables]
-        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
+        names, literals = found.visits.files, found.visits.literals
+        corrected = {names[k] for k in np.unique(literals.file).tolist()}
         kept = tuple(
             _without_values(one) if one.lines.source.name in corrected else one
             for one in files
         )
-        return JobReading(tuple(texts), visits, found, kept, missed)
+        every = (*found.diagnostics, *told)
+        return replace(found, texts=tuple(texts), diagnostics=every, programs=kept)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""
