@@ -46,6 +46,7 @@ from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
+_CALLS = ir.Instruction | ir.FunctionCall
 F = TypeVar("F", bound=TaskFile)
 
 
@@ -357,14 +358,27 @@ class TaskSymbols(ABC, Generic[F]):
         local = [one for one in self.every_routine if one.rows.head.local]
         if not local or self.calls_by_text:
             return frozenset()
-        calls, found = ir.Instruction | ir.FunctionCall, set(self.odd_words)
+        found = set(self.odd_words)
         for file in self.files:
             parts = ir.walk(*file.text.said)
-            found |= {one.name for one in parts if isinstance(one, calls)}
+            found |= {one.name for one in parts if isinstance(one, _CALLS)}
         return frozenset(
             one.key for one in local
             if one.rows.head.name not in found and one.rows.head.kind != "trap"
         )  # fmt: skip
+
+    @cached_property
+    def called_elsewhere(self) -> frozenset[str]:
+        """Names of local routines that may be called where others are meant by them."""
+        local = [one for one in self.every_routine if one.rows.head.local]
+        place = {one.rows.head.name: one.file for one in local}
+        found = set[str]()
+        for number, file in enumerate(self.files) if local else ():
+            parts = ir.walk(*file.text.said)
+            names = {one.name for one in parts if isinstance(one, _CALLS)} & {*place}
+            several = len({one.module for one in self.routines_by_file[number]}) > 1
+            found |= {name for name in names if several or place[name] != number}
+        return frozenset(found)
 
     @cached_property
     def written(self) -> frozenset[str]:

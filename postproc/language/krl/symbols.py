@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.declarations import Datum, TaskRoutine
+from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
@@ -113,7 +113,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def new_uses(self) -> NamesUsed:
         """Return what knows moves and routines by name."""
-        return _KrlUses(self.routines, points=self._points, callers=self._callers)
+        return _KrlUses(self.routines, self.called_elsewhere, points=self._points)
 
     def shares(self, file: int, datum: Datum) -> bool:
         """Return True for GLOBAL data, and those of ``$config.dat``."""
@@ -309,18 +309,6 @@ class KrlTask(TaskSymbols[KrlFile]):
         uses.read |= self.words_of_odd()
 
     @cached_property
-    def _callers(self) -> Mapping[str, set[int]]:
-        """Files by the names of routines that their statements call."""
-        found = defaultdict[str, set[int]](set)
-        for number, text in enumerate(file.text for file in self.files):
-            rows = text.of_kind(lambda one: bool(list_calls(one)))
-            for name in set[str]().union(
-                *(list_calls(text.statement(k)) for k in rows)
-            ):
-                found[name].add(number)
-        return found
-
-    @cached_property
     def _points(self) -> frozenset[str]:
         """Names of data that are positions."""
         points = (one for one in self.every_datum if one.type in POSITIONS)
@@ -390,11 +378,9 @@ class _KrlUses(NamesUsed):
 
     Attributes:
         points: Names of positions.
-        callers: Files by the names of routines that they call.
     """
 
     points: Collection[str] = ()
-    callers: Mapping[str, set[int]] = field(default_factory=dict)
 
     def note(self, one: ir.SourceStatement) -> None:
         """Note where moves go; what holds for them alone changes nothing."""
@@ -430,11 +416,6 @@ class _KrlUses(NamesUsed):
         first, second = operand.operands
         behind = isinstance(first, ir.DataObject) and first.name in self.points
         return (first, [second]) if behind else (second, [first])
-
-    def is_passed(self, routine: TaskRoutine) -> bool:
-        """Return True unless another file may mean another routine by its name."""
-        head = routine.rows.head
-        return not head.local or self.callers.get(head.name, set()) <= {routine.file}
 
 
 def _is_of_part(target: ir.DataObject) -> bool:

@@ -95,7 +95,7 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     def new_uses(self) -> NamesUsed:
         """Return what knows instructions and functions by name."""
-        return _RapidUses(self.routines)
+        return _RapidUses(self.routines, self.called_elsewhere)
 
     def shares(self, file: int, datum: Datum) -> bool:
         """Return True for all but LOCAL data."""
@@ -305,10 +305,6 @@ class _RapidUses(NamesUsed):
             return None
         point, *others = operand.values or (None,)
         return point, others
-
-    def is_passed(self, routine: TaskRoutine) -> bool:
-        """Return True but for a local one, which need not be what is called."""
-        return not routine.rows.head.local
 
 
 def as_assignment(
