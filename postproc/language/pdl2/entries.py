@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Ints, chunks, slim
+from postproc.arrays import Bools, Floats, Indices, Ints, slim
 from postproc.language.pdl2.parser import EntryPart
 from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
@@ -104,7 +104,6 @@ class Entries:
         slots: Index of each number in the file, (k, 6), -1 for none.
         aux: Values of the auxiliary axes of their layout, (k, a), NaN likewise.
         arm: Arm number, (k,), 0 where it is not said.
-        known: Which numbers are known, (k, 6), where they are let go of.
     """
 
     row: Rows
@@ -116,7 +115,6 @@ class Entries:
     slots: Indices
     aux: Floats
     arm: Indices
-    known: Bools | None = None
 
     @cached_property
     def parts(self) -> list[str]:
@@ -124,34 +122,6 @@ class Entries:
         if not self.name.hold("[."):
             return []
         return [name for name in self.row if "[" in name or "." in name]
-
-    def with_numbers(self, value: Floats, changed: Bools) -> Entries | None:
-        """Take over numbers that are written otherwise now.
-
-        Args:
-            value: What the numbers of the file are worth, (m,).
-            changed: Which of them are written otherwise, (m,).
-
-        Returns:
-            The entries; None where one was not known, is not, or belongs to none.
-        """
-        known = np.isfinite(self.numbers) if self.known is None else self.known
-        numbers, met = np.empty(self.slots.shape), 0
-        for k in chunks(len(self.slots)):
-            slots = self.slots[k]
-            hit = (slots >= 0) & changed[slots]
-            numbers[k] = np.where(known[k], value[slots], np.nan)
-            if not np.isfinite(numbers[k][hit]).all():
-                return None
-            met += int(hit.sum())
-        if met != np.count_nonzero(changed):
-            return None
-        return replace(self, numbers=numbers, known=None)
-
-    def without_numbers(self) -> Entries:
-        """Let go of the numbers of positions: they can be read again."""
-        known = slim(np.isfinite(self.numbers))
-        return replace(self, numbers=np.empty((0, 6)), known=known)
 
     def layout_of(self, row: int) -> Layout:
         """Return how an entry is written."""

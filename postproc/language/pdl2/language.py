@@ -18,11 +18,7 @@ from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.nested import name_parts
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse, parse_again
-from postproc.language.pdl2.variable_file import (
-    VariableFile,
-    read_variables,
-    read_variables_again,
-)
+from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
 from postproc.language.text.source import Source
@@ -81,11 +77,8 @@ class Pdl2(Language):
         files += [] if variables is None else [variables]
         names, literals = found.visits.files, found.visits.literals
         corrected = {names[k] for k in np.unique(literals.file).tolist()}
-        kept = tuple(
-            _without_values(one) if one.lines.source.name in corrected else one
-            for one in files
-        )
         every = (*found.diagnostics, *told)
+        kept = tuple(_list_kept(files, corrected))
         return replace(found, texts=tuple(texts), diagnostics=every, programs=kept)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
@@ -141,35 +134,29 @@ def _refuse_other_arm(program: Program, start: Start) -> None:
 
 
 def _parse(source: Source, known: Sequence[Parsed]) -> Program:
-    """Parse a file, unless it was parsed before."""
+    """Parse a file, unless it was parsed before and its numbers are still known."""
     for one in known:
         if isinstance(one, Program) and one.lines.source.name == source.name:
-            return one if _is_whole(one, source) else parse_again(source, one)
+            whole = len(one.lines.value) == len(one.lines.numbers)
+            same = whole and one.lines.source == source
+            return one if same else parse_again(source, one)
     return parse(source)
 
 
 def _variables(source: Source, known: Sequence[Parsed]) -> VariableFile:
     """Read a variable file, unless it was read before."""
-    for one in known:
-        if isinstance(one, VariableFile) and one.source.name == source.name:
-            return one if _is_whole(one, source) else read_variables_again(source, one)
-    return read_variables(source)
+    files = (one for one in known if isinstance(one, VariableFile))
+    same = (one for one in files if one.source == source)
+    return next(same, None) or read_variables(source)
 
 
-def _is_whole(one: Parsed, source: Source) -> bool:
-    """Tell whether a file was read before as it is, and its numbers are still known."""
-    if isinstance(one, VariableFile):
-        whole = one.entries.known is None
-    else:
-        whole = len(one.lines.value) == len(one.lines.numbers)
-    return whole and one.lines.source == source
-
-
-def _without_values(one: Parsed) -> Parsed:
-    """Let go of the numbers of a file, which are about to change."""
-    if isinstance(one, VariableFile):
-        return replace(one, entries=one.entries.without_numbers())
-    return replace(one, lines=one.lines.without_values())
+def _list_kept(files: Sequence[Parsed], corrected: set[str]) -> Iterator[Parsed]:
+    """Yield what serves again, programs without numbers that are about to change."""
+    for one in files:
+        if one.lines.source.name not in corrected:
+            yield one
+        elif isinstance(one, Program):
+            yield replace(one, lines=one.lines.without_values())
 
 
 def _file(program: Program) -> str:

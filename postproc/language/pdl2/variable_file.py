@@ -26,7 +26,7 @@ from postproc.language.pdl2.entries import (
 )
 from postproc.language.pdl2.nested import complete_entries, find_fields, with_fields
 from postproc.language.pdl2.parser import parse_value_form
-from postproc.language.text.logical_lines import read_lines, reread_lines
+from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
@@ -81,27 +81,6 @@ def read_variables(source: Source) -> VariableFile:
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
     return VariableFile(lines.without_values(), entries, told, fields.unread)
-
-
-def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
-    """Read a variable file that should differ from one read before in numbers alone.
-
-    Args:
-        source: The file.
-        before: What it was.
-
-    Raises:
-        ProgramError: A string does not end on its line.
-    """
-    found = reread_lines(source, before.lines)
-    if found is None or not len(before.entries.slots):
-        return read_variables(source)
-    entries = before.entries.with_numbers(found.lines.value, found.changed)
-    if entries is None:
-        return read_variables(source)
-    told = found.move(before.diagnostics)
-    lines = found.lines.without_values()
-    return VariableFile(lines, entries, told, before.unread)
 
 
 def _distinguish_entries(
