@@ -186,6 +186,21 @@ class Branch(SourceStatement):
     then: SourceStatement | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class CompactIf(SourceStatement):
+    """``IF condition statement``: a statement that runs where a condition holds."""
+
+    condition: Operand
+    statement: SourceStatement
+
+
+def inside(one: SourceStatement) -> SourceStatement:
+    """Return the statement behind a condition, the statement itself without one."""
+    while isinstance(one, CompactIf):
+        one = one.statement
+    return one
+
+
 DIVISIONS = ("elseif", "case", "default")
 
 

@@ -98,13 +98,11 @@ class Points:
 
     Attributes:
         held: What they are given, by key.
-        places: Places of all points in it, and maybe of others.
-        routines: File, module and routine of these.
+        routines: File, module and routine that declare points in it, and maybe others.
         alike: Tells whether two assignments gave the same to a point.
     """
 
     held: SharedMap[Key, AssignedPoint] = field(default_factory=SharedMap, hash=False)
-    places: SharedMap[Place, bool] = field(default_factory=SharedMap, compare=False)
     routines: frozenset[tuple[int, str, str]] = field(
         default=frozenset(), compare=False
     )
@@ -112,19 +110,11 @@ class Points:
         default=operator.eq, compare=False
     )
 
-    def __contains__(self, place: Place) -> bool:
-        """Tell whether anything may be known of a point or an array."""
-        return self.places.get(place) is not None
-
     def give(self, point: AssignedPoint) -> Points:
         """Return it with what an assignment gives to a point."""
-        held, places, routines = self.held.copy(), self.places, self.routines
+        held = self.held.copy()
         held[point.key] = point
-        if point.place not in self:
-            places = places.copy()
-            places[point.place] = True
-            routines |= {point.place[:3]}
-        return Points(held, places, routines, self.alike)
+        return Points(held, self.routines | {point.place[:3]}, self.alike)
 
     def forget_shared(self) -> Points:
         """Return it with what routines declare alone: nothing else knows that."""
@@ -132,8 +122,6 @@ class Points:
 
     def forget(self, place: Place) -> Points:
         """Return it without any element of an array, or without a point."""
-        if place not in self:
-            return self
         return self._without(lambda key: key[0] == place)
 
     def leave(self, routine: tuple[int, str, str]) -> Points:

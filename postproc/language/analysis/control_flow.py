@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from postproc.language import ir
 
-EXIT = "exit-loop"
+EXIT, CURVE = "exit-loop", "spline"
 ENDS = {
     "if": "endif",
     "while": "endwhile",
@@ -17,28 +17,11 @@ ENDS = {
     "loop": "endloop",
     "repeat": "until",
     "condition": "endcondition",
+    CURVE: "endspline",
 }
 CLOSING = frozenset(ENDS.values())
 LOOPS = ("while", "loop", "repeat", "for")
-_DIVIDED_BY = {"else": ("if", "test"), "elseif": ("if",)}  # others divide a test
 CYCLE = "cycle"
-
-
-@dataclass(frozen=True)
-class HeadedRows:
-    """A module or a routine: the statements from its head to its end.
-
-    Attributes:
-        head: What it begins with; it has a name.
-        first, last: Rows of its head and of its end; of the last statement that
-            can be its own where no end is.
-        ended: It has its end.
-    """
-
-    head: Any
-    first: int
-    last: int
-    ended: bool = True
 
 
 @dataclass(frozen=True)
@@ -59,6 +42,7 @@ class ControlFlow:
         conditions: Heads and ends of blocks that run whenever a condition holds.
         cycle: Row from which on a program runs over and over, -1 where there is none.
         problems: Rows of what does not match, and what is wrong there.
+        nowhere: Rows that lead to labels which do not exist, likewise.
     """
 
     first: int
@@ -74,6 +58,7 @@ class ControlFlow:
     conditions: tuple[tuple[int, int], ...] = ()
     cycle: int = -1
     problems: tuple[tuple[int, str], ...] = ()
+    nowhere: tuple[tuple[int, str], ...] = ()
 
     def behind(self, head: int) -> int:
         """Return the row behind a block, by its head or one of its divisions."""
@@ -85,6 +70,25 @@ class ControlFlow:
         return tuple(one for one in self.divisions.get(head, ()) if one > row)
 
 
+@dataclass(frozen=True)
+class HeadedRows:
+    """A module or a routine: the statements from its head to its end.
+
+    Attributes:
+        head: What it begins with; it has a name.
+        first, last: Rows of its head and of its end; of the last statement that
+            can be its own where no end is.
+        ended: It has its end.
+        flow: The blocks of a routine.
+    """
+
+    head: Any
+    first: int
+    last: int
+    ended: bool = True
+    flow: ControlFlow = field(default=ControlFlow(0, 0), compare=False)
+
+
 def word_of(one: ir.Node | None) -> str:
     """Return what a statement is to blocks: if, else, endif, .., "" for all else."""
     match one:
@@ -92,13 +96,13 @@ def word_of(one: ir.Node | None) -> str:
             return "for"
         case ir.Branch(word=word) | ir.BlockWord(word=word):
             return word
-    return ""
+    return getattr(one, "block", "")
 
 
 def is_structural(one: ir.SourceStatement) -> bool:
     """Tell whether a statement is a label, or begins, divides or ends a block."""
-    kinds = ir.LabelMark | ir.ForLoop | ir.Branch | ir.BlockWord | ir.JumpTo
-    return isinstance(one, kinds) or one == ir.Leave(EXIT)
+    jumps = isinstance(one, ir.LabelMark | ir.JumpTo) or one == ir.Leave(EXIT)
+    return jumps or word_of(one) != ""
 
 
 @dataclass
@@ -108,11 +112,15 @@ class FlowReader:
     Attributes:
         line_of: The line of a row, for messages.
         spell: How the language writes the words of blocks.
+        of_else: Which blocks have an ELSE.
+        tell_open: Says that a block, by its row and word, is not closed.
         problems: What does not match.
     """
 
     line_of: Callable[[int], int] = int
     spell: Callable[[str], str] = str.upper
+    of_else: tuple[str, ...] = ("if",)
+    tell_open: Callable[[int, str], str] | None = None
     problems: list[tuple[int, str]] = field(default_factory=list)
     _end: dict[int, int] = field(default_factory=dict)
     _head: dict[int, int] = field(default_factory=dict)
@@ -138,7 +146,8 @@ class FlowReader:
             self._close(row, word)
         elif ir.divides(one):
             around = self._open[-1:]
-            if around and around[0][1] in _DIVIDED_BY.get(word, ("test",)):
+            divided = {"else": self.of_else, "elseif": ("if",)}.get(word, ("test",))
+            if around and around[0][1] in divided:
                 self._divisions[around[0][0]].append(row)
             else:
                 self._refuse(row, word)
@@ -166,7 +175,9 @@ class FlowReader:
         if not self._open or ENDS[self._open[-1][1]] != word:
             self._refuse(row, word)
             return
-        head, _ = self._open.pop()
+        head, kind = self._open.pop()
+        if kind == CURVE:  # ways neither part nor meet there
+            return
         for part in (head, *self._divisions[head]):
             self._end[part] = row
         self._head[row] = head
@@ -178,12 +189,13 @@ class FlowReader:
             text += f" (line {self.line_of(begin)} opens {self.spell(around)})"
         self.problems.append((row, text))
 
+    def _tell_open(self, row: int, word: str) -> str:
+        return f"this {self.spell(word)} is never closed"
+
     def flow(self, first: int, last: int, handlers: range = range(0)) -> ControlFlow:
         """Return where ways lead, and where they meet."""
-        never = [
-            (row, f"this {self.spell(word)} is never closed")
-            for row, word in self._open
-        ]
+        tell = self.tell_open or self._tell_open
+        never = [(row, tell(row, word)) for row, word in self._open]
         lost = [
             (row, f"label {label} does not exist")
             for row, label in self._jumps
@@ -194,33 +206,11 @@ class FlowReader:
         behind = {end + 1 for head, end in heads.items() if of[head] != "if"}
         joins = {*self._labels.values(), *heads, *self._head, *behind, *cycle}
         return ControlFlow(
-            first, last, handlers, self._end, self._head,
+            first, last, handlers, {**self._end}, {**self._head},
             {row: tuple(parts) for row, parts in self._divisions.items()},
-            self._labels, frozenset(joins),
+            {**self._labels}, frozenset(joins),
             {head: end for head, end in heads.items() if of[head] == "for"},
-            self._exits,
+            {**self._exits},
             tuple(sorted((h, e) for h, e in heads.items() if of[h] == "condition")),
-            self._cycle, (*self.problems, *never, *lost),
+            self._cycle, (*self.problems, *never), tuple(lost),
         )  # fmt: skip
-
-
-def flow_of(
-    statement: Callable[[int], ir.SourceStatement],
-    rows: Iterable[int],
-    routine: HeadedRows,
-    handlers: Iterable[int] = (),
-) -> ControlFlow:
-    """Find the blocks of a routine.
-
-    Args:
-        statement: What the rows of its file say.
-        rows: Those of its rows that are structural, ascending.
-        routine: All of its rows.
-        handlers: Its rows that error handlers begin with, ascending.
-    """
-    last = next(iter(handlers), routine.last)
-    reader = FlowReader()
-    for row in rows:
-        if row < last:
-            reader.take(row, statement(row))
-    return reader.flow(routine.first + 1, last, range(last, routine.last))

@@ -20,7 +20,7 @@ NOT_UNROLLED = (
     "the loop runs {:,} times: too often to be followed round by round; targets that "
     "depend on its counter are not compensated"
 )
-_CONTROL = (ir.Branch, ir.BlockWord, ir.ForLoop, ir.JumpTo, ir.Leave)
+_CONTROL = ir.Branch | ir.BlockWord | ir.ForLoop | ir.JumpTo | ir.Leave | ir.CompactIf
 
 
 class RoutinePlace(Protocol):
@@ -294,6 +294,8 @@ class Interpreter(ABC, Generic[S]):
                 self._decide(at, one, state)
             case ir.Branch(word="test"):
                 self._otherwise(at, state)
+            case ir.CompactIf():
+                return self._run_if(at, one, state)
             case ir.BlockWord(word="endwhile" | "endloop") if row in flow.head:
                 self.enter(at.to(flow.head[row]), state)
             case ir.Branch(word="condition"):
@@ -331,6 +333,16 @@ class Interpreter(ABC, Generic[S]):
             self.go_on(at.to(flow.behind(at.row)), state)
         elif truth is not True:
             self.enter(at.to(flow.head.get(at.row, at.row)), state)
+
+    def _run_if(self, at: At, one: ir.CompactIf, state: S) -> S | None:
+        """Run a statement, or pass it, or both where its condition is not known."""
+        truth = self.truth(at, one.condition, state)
+        if truth is False:
+            return state
+        after = self.run_one(at, one.statement, state.copy())
+        if truth or after is None:
+            return after if truth else state
+        return state.join(after)
 
     def _otherwise(self, head: At, state: S) -> None:
         """Go to the divisions of a block that may be meant, or to its end."""

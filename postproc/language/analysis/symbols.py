@@ -46,6 +46,7 @@ from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
+_CALLS = ir.Instruction | ir.FunctionCall
 F = TypeVar("F", bound=TaskFile)
 
 
@@ -299,9 +300,23 @@ class TaskSymbols(ABC, Generic[F]):
         return frozenset(datum.name for datum in self.every_datum)
 
     @cached_property
+    def loop_variables(self) -> frozenset[str]:
+        """Names of all variables of loops."""
+        texts = (file.text for file in self.files)
+        rows = ((text, text.of_kind(_is_loop)) for text in texts)
+        return frozenset(text.statement(k).name for text, own in rows for k in own)
+
+    @cached_property
     def taught_lines(self) -> Sequence[frozenset[int]]:
         """Lines of every file that a comment marks as taught."""
         return [self.comments.list_taught(file.text.source) for file in self.files]
+
+    def is_taught(self, name: str, file: int, row: int) -> bool:
+        """Return True if data of a statement were taught, by the cell or a comment."""
+        lines = self.files[file].text.lines(row)
+        return name in self.start.taught or not self.taught_lines[file].isdisjoint(
+            lines
+        )
 
     # What statements change and take.
 
@@ -343,14 +358,27 @@ class TaskSymbols(ABC, Generic[F]):
         local = [one for one in self.every_routine if one.rows.head.local]
         if not local or self.calls_by_text:
             return frozenset()
-        calls, found = ir.Instruction | ir.FunctionCall, set(self.odd_words)
+        found = set(self.odd_words)
         for file in self.files:
             parts = ir.walk(*file.text.said)
-            found |= {one.name for one in parts if isinstance(one, calls)}
+            found |= {one.name for one in parts if isinstance(one, _CALLS)}
         return frozenset(
             one.key for one in local
             if one.rows.head.name not in found and one.rows.head.kind != "trap"
         )  # fmt: skip
+
+    @cached_property
+    def called_elsewhere(self) -> frozenset[str]:
+        """Names of local routines that may be called where others are meant by them."""
+        local = [one for one in self.every_routine if one.rows.head.local]
+        place = {one.rows.head.name: one.file for one in local}
+        found = set[str]()
+        for number, file in enumerate(self.files) if local else ():
+            parts = ir.walk(*file.text.said)
+            names = {one.name for one in parts if isinstance(one, _CALLS)} & {*place}
+            several = len({one.module for one in self.routines_by_file[number]}) > 1
+            found |= {name for name in names if several or place[name] != number}
+        return frozenset(found)
 
     @cached_property
     def written(self) -> frozenset[str]:
@@ -865,6 +893,10 @@ def _names_data(one: ir.SourceStatement) -> bool:
     """Return True unless a statement declares data whose values name none."""
     values = ir.walk(one) if isinstance(one, ir.Declaration) else [ir.DataObject("")]
     return any(isinstance(part, ir.DataObject | ir.FunctionCall) for part in values)
+
+
+def _is_loop(one: ir.SourceStatement) -> bool:
+    return isinstance(one, ir.ForLoop)
 
 
 def holds_odd(one: ir.SourceStatement) -> bool:

@@ -17,11 +17,7 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
 from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.control_flow import (
-    ControlFlow,
-    flow_of,
-    is_structural,
-)
+from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.analysis.declarations import TaskRoutine
 from postproc.language.analysis.goals import GoalReader
 from postproc.language.analysis.interpreter import (
@@ -150,6 +146,7 @@ class TaskMachine(Interpreter[Arrived]):
         acting: Statements that move, call, or change what moves are made with; they
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
+        still: Names of what is known not to move, nor to change how moves are made.
         reader: Reads where moves lead.
         task: What its names mean.
         diagnostics: What else was found.
@@ -161,6 +158,7 @@ class TaskMachine(Interpreter[Arrived]):
     procedures: ClassVar[Collection[str]]
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
+    still: ClassVar[Collection[str]]
     reader: ClassVar[type[GoalReader]]
     task: TaskSymbols[Any] = field(kw_only=True)
     diagnostics: set[Diagnostic] = field(default_factory=set)
@@ -173,7 +171,6 @@ class TaskMachine(Interpreter[Arrived]):
         default_factory=dict
     )
     _effects: dict[tuple[int, int], Effects] = field(default_factory=dict)
-    _flows: dict[tuple[int, int], ControlFlow] = field(default_factory=dict)
     _recursive: dict[tuple[int, int], bool] = field(default_factory=dict)
     _changes: dict[tuple[int, int], frozenset[str]] = field(default_factory=dict)
     _asked: dict[int, tuple[ir.SourceStatement, Sequence[ir.Node]]] = field(
@@ -209,13 +206,9 @@ class TaskMachine(Interpreter[Arrived]):
     def own_effects(self, one: ir.SourceStatement) -> Effects:
         """Return what a statement may do to moves, but for what it calls."""
 
-    @abstractmethod
-    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
-        """Return the names of what a statement calls where it runs."""
-
-    @abstractmethod
     def is_still(self, name: str) -> bool:
         """Return True if what is no routine of the task is known not to move."""
+        return name in self.still or self.declares_motionless(name)
 
     @abstractmethod
     def is_move(self, one: ir.SourceStatement) -> bool:
@@ -237,13 +230,14 @@ class TaskMachine(Interpreter[Arrived]):
         """Return rows that are read by themselves, None where all are."""
         return set()
 
-    def inside(self, one: ir.SourceStatement) -> ir.SourceStatement:
-        """Return what a statement does: what stands behind its condition, or itself."""
-        return one
-
     def is_asked(self, part: ir.Node) -> bool:
         """Return True if it counts that a statement asks for something as it runs."""
         return isinstance(part, ir.FunctionCall)
+
+    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
+        """Return the names of what a statement calls where it runs."""
+        return [part.name for part in self.task.values_of(one)
+                if isinstance(part, ir.Instruction | ir.FunctionCall)]  # fmt: skip
 
     def list_asked(self, one: ir.SourceStatement) -> Sequence[Any]:
         """List what a statement asks for as it runs, of what counts."""
@@ -269,10 +263,6 @@ class TaskMachine(Interpreter[Arrived]):
         for to in sorted(flow.joins | {end + 1 for end in flow.head}):
             self.go_on(at.to(to), here)
         self.leave(at.context, here)
-
-    def handles(self, one: ir.SourceStatement) -> bool:
-        """Tell whether the handlers of a routine begin with a statement."""
-        return False
 
     def scopes_of(
         self, routine: TaskRoutine, seen: frozenset[tuple[int, int]] = frozenset()
@@ -302,7 +292,7 @@ class TaskMachine(Interpreter[Arrived]):
         found = defaultdict[str, list[tuple[TaskRoutine, int, ir.Instruction]]](list)
         for routine in self.task.every_routine:
             for row in routine.inside:
-                one = self.inside(self.texts[routine.file].statement(row))
+                one = ir.inside(self.texts[routine.file].statement(row))
                 if isinstance(one, ir.Instruction):
                     found[one.name].append((routine, row, one))
         return found
@@ -333,7 +323,7 @@ class TaskMachine(Interpreter[Arrived]):
             scope: Where it stands.
             here: How the arm comes to it, None where that does not count.
         """
-        one = self.inside(one)
+        one = ir.inside(one)
         if not self.is_move(one):
             return ()
         modes, points = (here.modes, here.points) if here else (None, NO_POINTS)
@@ -467,17 +457,10 @@ class TaskMachine(Interpreter[Arrived]):
         self.run_named_beside(name)
         return self.unknown(at, here, "names several routines")
 
-    def call_function(self, at: At, name: str, still: bool, here: Arrived) -> Arrived:
-        """Allow for what a function does.
-
-        Args:
-            at: Where the call stands.
-            name: Of the function.
-            still: It is known not to move, if it is none of the task.
-            here: How the arm comes to it.
-        """
+    def call_function(self, at: At, name: str, here: Arrived) -> Arrived:
+        """Allow for what a function does."""
         found = self.task.routine(name, at.place.scope)
-        what = ""
+        what, still = "", TaskMachine.is_still(self, name)
         if found is None and (name in self.task.routines or not still):
             what = f"calls the function {name}, which is not known: it may move"
         elif found is not None and self.routine_effects(found):
@@ -516,34 +499,25 @@ class TaskMachine(Interpreter[Arrived]):
             caller: Where the call stands, None where nothing calls it.
             here: How the arm comes to it.
         """
-        (file, module, routine), rows = found, self.task.numbering.rows
-        at = rows[file] + routine.first if caller is None else caller.job_row
-        around = self.root if caller is None else caller.context
+        (file, module, routine), task = found, self.task
+        at, around = task.numbering.rows[file] + routine.first, self.root
+        call, points = None, here.points
+        if caller is not None:
+            at, around = caller.job_row, caller.context
+            call = self._call_of(found, caller)
         context = around.find(at, CALLED)
         if context is None:
-            context = around.within(at, CALLED, self._place_of(found, caller))
-        own = self.task.unit(file), module, context.place.scope.routine
-        points = here.points.leave(own)  # declared anew
-        if caller and (call := self._call_of(found, caller)) is not None:
-            there = scope_at(caller, here)
-            points = self.task.hand_over(points, found, call, there)
+            bound = call and caller and self._bind(found, call, scope_at(caller))
+            text, first = self.texts[file], task.numbering.rows[file]
+            scope = bound or task.scope_of(found)
+            place = TaskPlace(scope, found, routine.flow, text, first)
+            context = around.within(at, CALLED, place)
+        own = task.unit(file), module, context.place.scope.routine
+        points = points.leave(own)  # declared anew
+        if call and caller:
+            points = task.hand_over(points, found, call, scope_at(caller, here))
         here = here.with_points(points)
         self.enter(At(context, context.place.flow.first), self.at_call(context, here))
-
-    def _place_of(self, found: TaskRoutine, caller: At | None) -> TaskPlace:
-        """Return where the statements of a routine stand that is called."""
-        file, _, routine = found
-        key, text, inside = found.key, self.texts[file], found.inside
-        if key not in self._flows:
-            rows = text.where(is_structural, inside.start, inside.stop)
-            handlers = text.where(self.handles, inside.start, inside.stop)
-            self._flows[key] = flow_of(text.statement, rows, routine, handlers)
-        scope = None
-        if caller and (call := self._call_of(found, caller)) is not None:
-            scope = self._bind(found, call, scope_at(caller))
-        scope = scope or self.task.scope_of(found)
-        first = self.task.numbering.rows[file]
-        return TaskPlace(scope, found, self._flows[key], text, first)
 
     def _bind(
         self, routine: TaskRoutine, call: ir.Instruction, there: Scope
@@ -579,7 +553,7 @@ class TaskMachine(Interpreter[Arrived]):
         """
         if not found.rows.head.parameters:
             return None
-        call = self.inside(caller.statement)
+        call = ir.inside(caller.statement)
         if not isinstance(call, ir.Instruction) or call.name != found.rows.head.name:
             return None
         return None if self._is_recursive(found) else call

@@ -47,6 +47,7 @@ class NamesUsed:
 
     Attributes:
         own: Routines of the task by name: what else has their names is hidden.
+        elsewhere: Names of local ones that other modules mean something else by.
         written: Those that assignments change; what takes a value does not read them.
         changed: Those that may be changed otherwise.
         read: Those that something but the destination of a move takes.
@@ -56,7 +57,8 @@ class NamesUsed:
         parts: Names of which moves go to elements or components.
     """
 
-    own: Mapping[str, Sequence[TaskRoutine]] = field(default_factory=dict)
+    own: Mapping[str, Sequence[TaskRoutine]]
+    elsewhere: Collection[str] = ()
     written: set[str] = field(default_factory=set)
     changed: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
@@ -84,10 +86,6 @@ class NamesUsed:
     ) -> tuple[ir.Operand | None, Sequence[ir.Operand | None]] | None:
         """Return the point that a value shifts and what by, None for all else."""
         return None
-
-    def is_passed(self, routine: TaskRoutine) -> bool:
-        """Return True if what a routine does to its parameters is all that counts."""
-        return False
 
     # What statements do.
 
@@ -166,7 +164,7 @@ class NamesUsed:
     ) -> list[tuple[ir.RoutineParameter, ir.Argument]] | None:
         """Pair arguments with parameters, None where it is not sure what is called."""
         found = self.own.get(name, ())
-        if len(found) != 1 or not self.is_passed(found[0]):
+        if len(found) != 1 or name in self.elsewhere:
             return None
         if any(one.passed_on for one in arguments):
             return None

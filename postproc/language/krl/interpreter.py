@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -38,7 +38,6 @@ from postproc.language.krl.symbols import (
     HELD,
     STILL,
     KrlTask,
-    list_calls,
     package_routines,
 )
 from postproc.language.visits import START
@@ -87,6 +86,7 @@ class KrlMachine(TaskMachine):
 
     procedures = ("def",)
     reader = KrlGoal
+    still = STILL | FUNCTIONS
     passed = (ir.Declaration,)
     acting = (
         ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -96,7 +96,7 @@ class KrlMachine(TaskMachine):
     task: KrlTask = field(kw_only=True)
     _met: set[tuple[int, int]] = field(default_factory=set)
     _assumed: dict[str, tuple[int, int]] = field(default_factory=dict)
-    _alone: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _changed: dict[tuple[int, int, int], frozenset[str]] = field(default_factory=dict)
     _before: dict[Reason, set[int]] = field(default_factory=lambda: defaultdict(set))
 
     def run(self) -> None:
@@ -138,37 +138,21 @@ class KrlMachine(TaskMachine):
     def counts_alone(self, at: At, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
 
-        A variable that is not the routine's own may be changed by routines that the
-        loop calls, and by what runs beside it.
+        One that is not the routine's own may be changed by routines that the loop
+        calls, and by what runs beside it.
         """
-        key = at.place.scope.file, at.row
-        if key not in self._alone:
-            self._alone[key] = self._counts_alone(at, one)
-        return self._alone[key]
-
-    def _counts_alone(self, at: At, one: ir.ForLoop) -> bool:
-        """Read a loop once for `counts_alone`."""
-        rows = range(at.row + 1, at.place.flow.loops.get(at.row, at.row))
-        text = self.texts[at.place.scope.file]
-        inside = [text.statement(k) for k in rows]
-        changed = {
-            data.name for other in inside for data in self.task.list_changes(other)
-        }
-        changed |= {other.name for other in inside if isinstance(other, ir.ForLoop)}
-        if one.name in changed:
-            return False
-        if one.name in self.task.odd_words:
-            return False
-        scope = at.place.scope
-        place = self.task.place(one.name, scope)
-        if place and place[1:3] == (scope.module, scope.routine):
-            return True
-        if one.name in self.task.beside:
-            return False
-        others = self.task.counted[one.name] > 1 or one.name in self.task.assigned
-        called = set[str]().union(*map(list_calls, inside))
-        calls_own = not called.isdisjoint(self.task.routines)
-        return not (others and (self._has_interrupts or calls_own))
+        scope, behind = at.place.scope, at.place.flow.loops.get(at.row, at.row)
+        key = scope.file, at.row + 1, behind
+        if key not in self._changed:
+            text, changes = self.texts[scope.file], self.task.list_changes
+            own = (changes(text.statement(row)) for row in range(at.row + 1, behind))
+            changed = frozenset(data.name for some in own for data in some)
+            place = self.task.place(one.name, scope)
+            if place is None or place[2] != scope.routine:
+                changed |= self._list_changes({key}) | self.task.volatile
+                changed |= self.task.beside
+            self._changed[key] = changed | self.task.odd_words
+        return one.name not in self._changed[key]
 
     @cached_property
     def _has_interrupts(self) -> bool:
@@ -294,11 +278,8 @@ class KrlMachine(TaskMachine):
         """Allow for what a statement reads, and for what its functions do."""
         for part in self.list_asked(one):
             if isinstance(part, ir.FunctionCall):
-                name = part.name
-                still = name in FUNCTIONS or name in STILL
-                still = still or self.declares_motionless(name)
-                after = self.call_function(at, name, still, here)
-                own = name in self.task.routines
+                after = self.call_function(at, part.name, here)
+                own = part.name in self.task.routines
                 here = _halt(here, None) if own and after is here else after
             else:
                 given = isinstance(one, ir.Assignment) and part is one.target
@@ -519,21 +500,16 @@ class KrlMachine(TaskMachine):
         modal = any(_is_modal(data.name) for data in self.task.list_changes(one))
         return frozenset([MOVES] if modal else [])
 
-    def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
-        """Yield functions and the instruction; of a trigger what it does."""
-        parts = (
-            ir.walk(one.action)
-            if isinstance(one, said.PathTrigger)
-            else self.task.values_of(one)
-        )
-        calls = ir.Instruction | ir.FunctionCall
-        yield from (part.name for part in parts if isinstance(part, calls))
+    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
+        """Return functions and the instruction; of a trigger what it does."""
+        if isinstance(one, said.PathTrigger):
+            one = one.action
+        return super().names_called(one)
 
     def is_still(self, name: str) -> bool:
-        """Return True for known routines and functions, and by the cell."""
-        known = name in STILL or name in FUNCTIONS or self.declares_motionless(name)
+        """Add the shipped list of routines of packages."""
         listed = name in package_routines() and not self._is_overruled(name)
-        return known or listed
+        return listed or super().is_still(name)
 
 
 def _is_modal(name: str) -> bool:

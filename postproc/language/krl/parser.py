@@ -130,7 +130,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "field": _field,
 }
 
-_PARSER = FormParser("krl", RULES, said.NAMES["reserved"], 1 << 14, 100)
+_parse = FormParser("krl", RULES, said.NAMES["reserved"]).statements
 
 
 def parse_statement(form: str) -> ir.SourceStatement:
@@ -140,4 +140,4 @@ def parse_statement(form: str) -> ir.SourceStatement:
         words = words[1:]
     if words[0] in said.NAMES["outside"] and len(words) > 1:
         return ir.SourceStatement()
-    return _PARSER.parse_statement(form)
+    return _parse(form)

@@ -15,20 +15,12 @@ from postproc.language.analysis.symbols import whole
 from postproc.language.krl import syntax as said
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.parser import parse_statement
-from postproc.language.text.blocks import INNER, BlockWords, Outline
+from postproc.language.text.blocks import Outline, ScopeWords
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
 
 _ROUTINES = ("def", "deffct")
-_WORDS = BlockWords(
-    ends={
-        **INNER, "end": "def", "endfct": "deffct", "enddat": "defdat",
-        "endspline": "spline",
-    },
-    scopes=(*_ROUTINES, "defdat"),
-    outer=(),
-    routines=_ROUTINES,
-)  # fmt: skip
+_WORDS = ScopeWords({"end": "def", "endfct": "deffct", "enddat": "defdat"}, _ROUTINES)
 
 
 @dataclass(frozen=True)
@@ -75,13 +67,11 @@ def read_krl(source: Source) -> KrlFile:
     moves = text.of_kind(lambda one: isinstance(one, said.KrlMove))
     for row in text.of_kind(lambda one: not isinstance(one, said.KrlMove)):
         match one := text.statement(row):
-            case said.SplineBlock(word="endspline"):
-                outline.word("endspline", row)
-                splines += [range(begin, row)] if begin >= 0 else []
-                begin = -1
-            case said.SplineBlock():
-                outline.open("spline", row, one)
-                begin = row
+            case said.SplineBlock(word=word):
+                outline.take(row, one, name)
+                ends = word == "endspline"
+                splines += [range(begin, row)] if ends and begin >= 0 else []
+                begin = -1 if ends else row
             case ir.Assignment(target=target, value=value):
                 index = _index(text, row, target.steps)
                 if outline.name("defdat") and index is not None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.declarations import Datum, TaskRoutine
+from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
@@ -113,7 +113,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def new_uses(self) -> NamesUsed:
         """Return what knows moves and routines by name."""
-        return _KrlUses(self.routines, points=self._points, callers=self._callers)
+        return _KrlUses(self.routines, self.called_elsewhere, points=self._points)
 
     def shares(self, file: int, datum: Datum) -> bool:
         """Return True for GLOBAL data, and those of ``$config.dat``."""
@@ -129,7 +129,7 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
         """Leave variables of the system, and of loops."""
-        own = not (name.startswith("$") or name in self.counted)
+        own = not (name.startswith("$") or name in self.loop_variables)
         return own and super().is_followed(name, datum, here)
 
     def fits(self, type_: str, component: str, value: float) -> bool:
@@ -166,23 +166,6 @@ class KrlTask(TaskSymbols[KrlFile]):
             text = "may be changed by the program: it is known only when that runs"
             return code, text
         return Code.NO_VALUE, "has no value that is known before the program runs"
-
-    @cached_property
-    def assigned(self) -> frozenset[str]:
-        """Names of data that statements other than loops may change."""
-        programs = (file for file in self.files if file.routines)
-        said_ones = (one for file in programs for one in file.text.said)
-        changed = (data for one in said_ones for data in self.list_changes(one))
-        return frozenset(data.name for data in changed) | self.beside | self.odd_words
-
-    @cached_property
-    def counted(self) -> Counter[str]:
-        """Names of the variables of loops, and how many loops count each."""
-        found = Counter[str]()
-        for text in (file.text for file in self.files):
-            rows = text.of_kind(lambda one: isinstance(one, ir.ForLoop))
-            found.update(text.statement(row).name for row in rows)
-        return found
 
     @cached_property
     def odd_words(self) -> frozenset[str]:
@@ -326,27 +309,10 @@ class KrlTask(TaskSymbols[KrlFile]):
         uses.read |= self.words_of_odd()
 
     @cached_property
-    def _callers(self) -> Mapping[str, set[int]]:
-        """Files by the names of routines that their statements call."""
-        found = defaultdict[str, set[int]](set)
-        for number, text in enumerate(file.text for file in self.files):
-            rows = text.of_kind(lambda one: bool(list_calls(one)))
-            for name in set[str]().union(
-                *(list_calls(text.statement(k)) for k in rows)
-            ):
-                found[name].add(number)
-        return found
-
-    @cached_property
     def _points(self) -> frozenset[str]:
         """Names of data that are positions."""
         points = (one for one in self.every_datum if one.type in POSITIONS)
         return frozenset(one.name for one in points)
-
-    def is_taught(self, name: str, file: int, row: int) -> bool:
-        """Return True if data of a statement were taught, by the cell or a comment."""
-        line = self.files[file].text.line(row)
-        return name in self.start.taught or line in self.taught_lines[file]
 
     # Values.
 
@@ -412,11 +378,9 @@ class _KrlUses(NamesUsed):
 
     Attributes:
         points: Names of positions.
-        callers: Files by the names of routines that they call.
     """
 
     points: Collection[str] = ()
-    callers: Mapping[str, set[int]] = field(default_factory=dict)
 
     def note(self, one: ir.SourceStatement) -> None:
         """Note where moves go; what holds for them alone changes nothing."""
@@ -428,6 +392,9 @@ class _KrlUses(NamesUsed):
                 self.take(angle)
             case said.SplineBlock():
                 pass
+            case ir.ForLoop(name=name):
+                self.targets.append(ir.DataObject(name))
+                super().note(one)
             case _:
                 super().note(one)
         if isinstance(one, said.KrlMove | said.SplineBlock):
@@ -449,11 +416,6 @@ class _KrlUses(NamesUsed):
         first, second = operand.operands
         behind = isinstance(first, ir.DataObject) and first.name in self.points
         return (first, [second]) if behind else (second, [first])
-
-    def is_passed(self, routine: TaskRoutine) -> bool:
-        """Return True unless another file may mean another routine by its name."""
-        head = routine.rows.head
-        return not head.local or self.callers.get(head.name, set()) <= {routine.file}
 
 
 def _is_of_part(target: ir.DataObject) -> bool:

@@ -116,3 +116,8 @@ class SplineBlock(SourceStatement):
     word: str
     words: tuple[str, ...] = ()
     settings: tuple[Assignment, ...] = ()
+
+    @property
+    def block(self) -> str:
+        """What it is to blocks."""
+        return "endspline" if self.word == "endspline" else "spline"

@@ -82,7 +82,7 @@ def take_effects(
 ) -> None:
     """Take in what rows do to variables that are not followed, and say so."""
     for part in parts:
-        within = Execution(here.world, part.place, here.row, here.store, here.volatile)
+        within = Execution(here.world, part.place, here.row, here.store)
         escape_names(within, part.effects.read, computes)
         invalidate_names(within, part.effects.assigned, changes)
 
@@ -101,9 +101,7 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
         if isinstance(statement, ast.Move):
             store = Store(lambda key: nothing, last=NOWHERE)
             store.forget_frames(why)
-            at = Execution(
-                here.world, place, row, store, here.volatile, context, reason
-            )
+            at = Execution(here.world, place, row, store, context, reason)
             move(machine, at, statement)
 
 
@@ -167,7 +165,7 @@ def _run_function(
     _bind(replace(here, store=store), inside, call.values)
     given = {parameter.name for parameter in body.parameters}
     for row in range(body.flow.first, body.flow.last):
-        at = Execution(here.world, inside, row, store, here.volatile, here.context)
+        at = Execution(here.world, inside, row, store, here.context)
         one = inside.statement(row)
         if machine.find_calls(inside, one):
             return None
@@ -368,7 +366,7 @@ def _setting(
     here.world.pin(value, f"${name.upper()} is set to it")
     if isinstance(value, Position) and name in FRAMES:
         value = replace(value, slots=(-1,) * 6, along=frozenset())
-    if f"${name}" in here.volatile:
+    if f"${name}" in here.world.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
 
@@ -389,7 +387,7 @@ def _frame_part(
     new: Value = replace(held.with_component(at, number), taught=taught)
     if any(held.numbers) and held.numbers in here.world.start.records:
         new = Nothing(f"a part of ${name.upper()}, which the cell gives, is assigned")
-    if f"${name}" in here.volatile:
+    if f"${name}" in here.world.volatile:
         new = Nothing("a condition handler changes it")
     here.store.set(**{name: new})
 

@@ -49,7 +49,6 @@ class Execution:
     place: Place
     row: int
     store: Store
-    volatile: frozenset[str] = frozenset()
     context: Context = field(default_factory=Context)
     reason: Reason = NO_REASON
 
@@ -207,12 +206,12 @@ class Execution:
     def _unsteady(self, target: Location) -> bool:
         """Tell whether a handler may change a variable, whatever name it has here."""
         names = {base_variable(key.rpartition("/")[2]) for key in target.keys}
-        return not names.isdisjoint(self.volatile)
+        return not names.isdisjoint(self.world.volatile)
 
     def _system(self, reference: ir.DataObject) -> Value:
         part = self.frame_part(reference)
         name = self.setting_name(reference) if part is None else part[0]
-        if name is None or f"${name}" in self.volatile:
+        if name is None or f"${name}" in self.world.volatile:
             return RUN_TIME
         held = self.store.settings.get(name, RUN_TIME)
         if part is None:
@@ -359,7 +358,7 @@ def copy_parts(here: Execution, value: ir.Operand, target: ir.DataObject) -> boo
     place, source = here.locate(target), here.locate(origin)
     if not parts or place.component != () or source.component != ():
         return False
-    if place.exact and source.exact and origin.name not in here.volatile:
+    if place.exact and source.exact and origin.name not in here.world.volatile:
         fill(here, place.key, target.name, origin.name, parts)
         return True
     for part in parts.values():

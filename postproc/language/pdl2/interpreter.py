@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.arrays import Ints
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.analysis.origins import NOWHERE
-from postproc.language.language import Start
+from postproc.language.language import JobReading, Start
 from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
@@ -44,7 +43,7 @@ from postproc.language.pdl2.side_effects import (
 )
 from postproc.language.pdl2.to_visits import Pdl2Collector
 from postproc.language.pdl2.variable_file import VariableFile
-from postproc.language.visits import START, Diagnostic, Meaning, Visits
+from postproc.language.visits import START, Meaning
 from postproc.robot.trajectory import Motion
 
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
@@ -66,7 +65,7 @@ class Pdl2Machine(Machine):
 
     def point(self, at: At, store: Store) -> Execution:
         """Return the point of the execution at a row."""
-        return Execution(self.world, at.place, at.row, store, self.volatile, at.context)
+        return Execution(self.world, at.place, at.row, store, at.context)
 
     def run_block(self, at: At, state: Store) -> tuple[int, Store] | None:
         """Run a block of moves, or all moves of a body whose blocks do not close."""
@@ -111,7 +110,7 @@ class Pdl2Machine(Machine):
         """Tell whether nothing but a loop itself changes its variable."""
         place, key = at.place, self.world.root(at.place, loop.name)
         inside = list_live(self.world, place, at.row + 1, place.flow.end[at.row])
-        return loop.name not in self.volatile and not any(
+        return loop.name not in self.world.volatile and not any(
             loop.name in part.effects.assigned
             and self.world.root(part.place, loop.name) == key
             for part in inside
@@ -288,27 +287,12 @@ def run_broken(machine: Machine, here: Execution) -> None:
     here.store.last = NOWHERE
 
 
-@dataclass(frozen=True)
-class Resolved:
-    """What a program does.
-
-    Attributes:
-        visits: Its arrivals.
-        diagnostics: What was found, sorted by file and line.
-        missed: Lines of moves that no way leads to, by file.
-    """
-
-    visits: Visits
-    diagnostics: tuple[Diagnostic, ...]
-    missed: Mapping[str, Ints]
-
-
 def resolve(
     program: Program,
     start: Start | None = None,
     variables: VariableFile | None = None,
     others: Mapping[str, Program] | None = None,
-) -> Resolved:
+) -> JobReading:
     """Follow a program from its start and list every arrival with its origins.
 
     Every way that the program may take is followed, with what is known of variables,
@@ -342,7 +326,8 @@ def resolve(
     moves = (np.flatnonzero(one.lines.which(has_target)) for one in world.programs())
     missed = collector.find_unreached(moves)
     machine.root.forget()
-    return Resolved(visits, tuple(sorted(world.diagnostics)), missed)
+    found = tuple(sorted(world.diagnostics))
+    return JobReading((), visits, found, missed=missed)
 
 
 def _keep_exported(world: World, machine: Machine) -> None:
@@ -403,7 +388,7 @@ def _handlers(machine: Machine, store: Store) -> None:
     for place in world.places():
         for first, last in place.flow.conditions:
             reach = live_rows(world, place, first, last)
-            machine.volatile |= reach.may_change
+            world.volatile |= reach.may_change
             for part in reach.parts:
                 for name in part.effects.read:
                     root = world.root(part.place, name)
@@ -412,7 +397,7 @@ def _handlers(machine: Machine, store: Store) -> None:
                 _moving_handler(machine, place, first, unknown)
             elif reach.cancels:
                 _cancelling_handler(machine, place, first, reach)
-    for name in machine.volatile:
+    for name in world.volatile:
         if name.startswith("$"):
             store.set(**{name[1:]: values.Nothing("a condition handler changes it")})
 

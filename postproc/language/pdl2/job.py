@@ -172,6 +172,8 @@ class World:
         changing: Exported variables, by key, that another program may write at any
             time: numbers, texts and switches, no positions.
         imported: Positions of other programs, by key, whose file values may be old.
+        volatile: Names of variables and settings (with ``$``) that condition handlers
+            may change at any time.
         taught_lines: Lines marked ``-- TAUGHT``, by file name.
         diagnostics: What was found; a message is kept once.
         loose: Variables, by key, that are used where it is not known what they hold,
@@ -194,6 +196,7 @@ class World:
     reached: dict[int, object] = field(default_factory=dict)
     changing: frozenset[str] = frozenset()
     imported: frozenset[str] = frozenset()
+    volatile: frozenset[str] = frozenset()
     _said: set[tuple[str, str]] = field(default_factory=set)
     _kept: set[frozenset[int]] = field(default_factory=set)
     _first: dict[str, list[str]] | None = None

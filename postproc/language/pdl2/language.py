@@ -66,11 +66,10 @@ class Pdl2(Language):
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
         release_memory(sum(len(text.numbers) for text in texts))
-        resolved = resolve(program, start, variables, others)
-        visits, missed = resolved.visits, resolved.missed
-        told = never_reached(missed, "the start", "program")
-        found = (*resolved.diagnostics, *told)
-        return JobReading(tuple(texts), visits, found, missed)
+        found = resolve(program, start, variables, others)
+        told = never_reached(found.missed, "the start", "program")
+        every = (*found.diagnostics, *told)
+        return replace(found, texts=tuple(texts), diagnostics=every)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""

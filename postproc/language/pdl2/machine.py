@@ -145,7 +145,6 @@ class Machine(Interpreter[Store]):
     """
 
     world: World
-    volatile: frozenset[str] = frozenset()
     recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
     handler: Reason = NO_REASON

@@ -368,7 +368,7 @@ class MoveBlocks:
             self._may_be[id(program)] = program.lines.said.which(_may_be_plain)
         if id(body) not in self.quiet:
             self.quiet[id(body)] = PlainMoves(
-                here.world, here.place, here.volatile, self._may_be[id(program)]
+                here.world, here.place, here.world.volatile, self._may_be[id(program)]
             )
         return self.quiet[id(body)]
 

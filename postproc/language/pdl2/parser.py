@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import count, zip_longest
+from itertools import zip_longest
 from typing import Any
 
 from postproc.language import ir
@@ -20,9 +19,7 @@ from postproc.language.text.common_rules import (
     part,
     parts,
 )
-from postproc.language.text.lexer import NAME_MARK
-from postproc.language.text.template_parser import FAILED, Children, FormParser, Word
-from postproc.language.text.templates import open_name
+from postproc.language.text.template_parser import KEPT, Children, FormParser, Word
 
 # Turn the grammar's trees into the statements of `syntax`, rule by rule.
 #
@@ -163,7 +160,7 @@ def _assign(c: Children) -> ir.Assignment:
 
 RULES: Mapping[str, Rule] = {
     **COMMON,
-    "line": _statement,
+    "line": lambda c: _statement(c) or ir.SourceStatement(),
     "labelled": lambda c: ir.LabelMark(low(c[0]).rstrip(": "), _statement(c)),
     "program": lambda c: ast.ProgramHead(
         low(c[0]), max(one if isinstance(one, int) else -1 for one in c)
@@ -316,22 +313,11 @@ VALUE_RULES: Mapping[str, Rule] = {
 }
 
 
-_PARSER = FormParser("pdl2", RULES, (), start="line")
-_VALUE_PARSER = FormParser("lsv", VALUE_RULES, (), start="line")
+parse_form = FormParser("pdl2", RULES, start="line").statements
+_VALUE_PARSER = FormParser("lsv", VALUE_RULES, start="line")
 
 
-@lru_cache(maxsize=8192)
-def parse_form(form: str) -> ir.SourceStatement:
-    """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
-    found = _PARSER.parse(form)
-    if found is FAILED:
-        numbered = count()
-        text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
-        return ir.NotUnderstood(text)
-    return found if isinstance(found, ir.SourceStatement) else ir.SourceStatement()
-
-
-@lru_cache(maxsize=8192)
+@lru_cache(maxsize=KEPT)
 def parse_value_form(form: str) -> EntryPart | None:
     """Parse the form of a line of a variable file, None where the grammar cannot."""
     found = _VALUE_PARSER.parse(form)

@@ -37,13 +37,16 @@ _UNKNOWN_OPENERS: tuple[tuple[str, ir.SourceStatement], ...] = (
     (r"CASE\b", ir.Branch("case")),
     (r"CONDITION\b(?!.*\bENDCONDITION\b)", ir.Branch("condition")),
 )
-_SPELT = {"test": "SELECT", "endtest": "ENDSELECT"}
 _STRING = re.compile(r"'[^']*'")
 _JUMP = re.compile(r"\b(?:GOTO|RETURN|EXIT)\b", re.I)
 _LEADS = (
     "where this line leads is not known: write its statements on lines of their own, "
     "in words that are understood"
 )
+
+
+def _spell(word: str) -> str:
+    return word.upper().replace("TEST", "SELECT")
 
 
 def recover_block(statement: ir.SourceStatement) -> ir.SourceStatement:
@@ -64,7 +67,7 @@ def read_flow(lines: ProgramLines, rows: Ints, first: int, last: int) -> Control
         first: The first row of the body.
         last: The row of its end.
     """
-    reader = FlowReader(lines.line, lambda word: _SPELT.get(word, word.upper()))
+    reader = FlowReader(lines.line, _spell, ("if", "test"))
     for row in rows.tolist():
         written = lines.statement(row)
         odd = ast.action(written)
@@ -419,9 +422,10 @@ class _Reader:
         within = np.searchsorted(self.structural, (scope.begin + 1, last))
         rows = self.structural[slice(*within)]
         flow = read_flow(self.lines, rows, scope.begin + 1, last)
-        for row, message in flow.problems:
+        problems = (*flow.problems, *flow.nowhere)
+        for row, message in problems:
             self.report(row, Code.BLOCK_STRUCTURE, message)
-        wrong = (self.lines.line(row) for row, _ in flow.problems)
+        wrong = (self.lines.line(row) for row, _ in problems)
         broken = min(wrong, default=0)
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()

@@ -12,7 +12,6 @@ from postproc.language.analysis.declarations import Datum
 from postproc.language.language import NamedPoint
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import MOTIONS
-from postproc.language.rapid.program import inside
 from postproc.language.text.source import CloneError, Edit, Source, insert_after
 
 TARGETS = ("robtarget", "jointtarget")
@@ -27,7 +26,7 @@ class RapidCloner(TaskCloner):
 
     def end_of(self, move: ir.SourceStatement, via: bool) -> ir.Operand | None:
         """Return where a move goes, or the point of its arc."""
-        move = inside(move)
+        move = ir.inside(move)
         assert isinstance(move, ir.Instruction)
         return MOTIONS[move.name].operands(move.arguments)[via]
 

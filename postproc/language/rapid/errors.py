@@ -11,7 +11,7 @@ from postproc.language import ir
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.control_flow import CLOSING, ControlFlow
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.program import inside
+from postproc.language.rapid.program import begins_handler
 from postproc.language.rapid.symbols import SHIFTS
 from postproc.language.text.statement_table import StatementText
 
@@ -111,13 +111,6 @@ def numbers_of(
     return ANY if "" in names or EVERY_JUMP in names else names
 
 
-def begins_handler(one: ir.SourceStatement) -> bool:
-    """Return True if a clause behind the statements of a routine begins."""
-    return isinstance(one, said.ErrorHandler) or (
-        isinstance(one, ir.BlockWord) and one.word in ("undo", "backward")
-    )
-
-
 @dataclass(frozen=True)
 class HandlerReader:
     """Reads the error handlers of a routine.
@@ -173,7 +166,7 @@ class HandlerReader:
         self, one: ir.SourceStatement, row: int, numbers: Numbers
     ) -> Iterator[HandlerEnd]:
         """Yield the word with which a statement of a handler goes on."""
-        while isinstance(one, said.CompactIf):
+        while isinstance(one, ir.CompactIf):
             numbers = common(numbers, self._find_errors(one.condition, row))
             one = one.statement
         if isinstance(one, ir.Leave) and one.word in LEAVES:
@@ -220,7 +213,7 @@ def may_raise(
     functions = [call.name for call in ir.calls_in(one)]
     if any(name in routines for name in functions):
         return bool(numbers)
-    one = inside(one)
+    one = ir.inside(one)
     name = one.name if isinstance(one, ir.Instruction) else ""
     if name in RAISING:
         return bool(numbers)
@@ -235,7 +228,7 @@ def may_be_skipped(one: ir.SourceStatement) -> bool:
     Plain moves, and instructions that set modes, raise none: but for an index or a
     function among their operands, and for what waits or couples.
     """
-    one = inside(one)
+    one = ir.inside(one)
     if not isinstance(one, ir.Instruction):
         return False
     concurrent = any(argument.name == "conc" for argument in one.arguments)

@@ -25,6 +25,7 @@ from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import (
     BY_NAME,
     MOTIONS,
+    NAMES,
     STILL_FUNCTIONS,
     SYNCHRONOUS,
     WAITING,
@@ -42,14 +43,12 @@ from postproc.language.rapid.moves import (
     own_numbers,
     pose_of,
 )
-from postproc.language.rapid.program import inside, is_move
+from postproc.language.rapid.program import is_move
 from postproc.language.rapid.symbols import RapidTask, as_assignment
 from postproc.language.visits import START
 
 PROCESSES = ("arc", "disp", "paint", "cap")  # moves that an error of theirs ends
 STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
-_PLAIN = (ir.Declaration, said.ConnectTrap, ir.Assignment, said.TypeAlias)
-_PASSED = (*_PLAIN, ir.SourceStatement, ir.LabelMark)
 
 
 @dataclass
@@ -64,8 +63,9 @@ class RapidMachine(TaskMachine):
 
     procedures = ("proc",)
     reader = RapidGoal
+    still = NAMES["still"] | HARMLESS | STILL_FUNCTIONS
     acting = (ir.Instruction,)
-    passed = _PLAIN
+    passed = (ir.Declaration, said.ConnectTrap, ir.Assignment, said.TypeAlias)
     task: RapidTask = field(kw_only=True)
     ends: list[Arrived] = field(default_factory=list)
     restarts: list[Arrived] = field(default_factory=list)
@@ -116,10 +116,10 @@ class RapidMachine(TaskMachine):
             scope, rows = self.task.scope_of(routine), routine.inside
             text = self.texts[routine.file]
             for row in text.where(
-                lambda one: getattr(inside(one), "name", "") in modal,
+                lambda one: getattr(ir.inside(one), "name", "") in modal,
                 rows.start, rows.stop,
             ):  # fmt: skip
-                one = inside(text.statement(row))
+                one = ir.inside(text.statement(row))
                 if isinstance(one, ir.Instruction):
                     given = self._modes(scope.at(row)).list_set(one)
                     found |= set() if given >= ANYTHING else given
@@ -137,7 +137,6 @@ class RapidMachine(TaskMachine):
 
     is_plain = staticmethod(are_targets)
     is_move = staticmethod(is_move)
-    inside = staticmethod(inside)
 
     @staticmethod
     def usual_step(first: float, last: float) -> float:
@@ -147,10 +146,6 @@ class RapidMachine(TaskMachine):
     def apart(self, context: Context) -> set[int] | None:
         """Return all (None) where an error may lead to any statement."""
         return None if self._exits_of(context) else set()
-
-    def handles(self, one: ir.SourceStatement) -> bool:
-        """Tell whether a handler begins, see `TaskMachine.handles`."""
-        return errors.begins_handler(one)
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
@@ -244,15 +239,7 @@ class RapidMachine(TaskMachine):
     def part_otherwise(
         self, at: At, one: ir.SourceStatement, here: Arrived
     ) -> Arrived | None:
-        """Go on behind ``IF condition statement;``."""
-        if isinstance(one, said.CompactIf):
-            holds = self.truth(at, one.condition, here)
-            if holds is False:
-                return here
-            after = self._compact(at, one.statement, here)
-            if holds:
-                return after
-            return here if after is None else here.join(after)
+        """Go on behind a call whose procedure only the run tells."""
         if isinstance(one, said.LateCall):  # of which procedures, a text may say
             if _is_text(one.procedure):
                 self.run_named_beside(_name_procedure(one.procedure))
@@ -273,30 +260,19 @@ class RapidMachine(TaskMachine):
 
     def calls_of(self, one: ir.SourceStatement) -> Iterable[TaskRoutine]:
         """Return all procedures where a text names the one that is called."""
-        inner = inside(one)
+        inner = ir.inside(one)
         if isinstance(inner, said.LateCall) or getattr(inner, "name", "") == BY_NAME:
             return self._of_kind("proc")
         return super().calls_of(one)
 
     def is_beside(self, one: ir.SourceStatement) -> bool:
         """Return True if a move calls a procedure on its way."""
-        return getattr(inside(one), "name", "") in SYNCHRONOUS
+        return getattr(ir.inside(one), "name", "") in SYNCHRONOUS
 
     def list_handlers(self, routine: TaskRoutine) -> Iterator[tuple[int, int, int]]:
         """Yield the rows from the first handler on."""
-        rows = routine.inside
-        heads = self.texts[routine.file].where(self.handles, rows.start, rows.stop)
-        yield from ((routine.file, row, rows.stop) for row in heads[:1])
-
-    def _compact(
-        self, at: At, inside: ir.SourceStatement, here: Arrived
-    ) -> Arrived | None:
-        """Run the statement behind a condition."""
-        if isinstance(inside, ir.Assignment):
-            return self.assign_point(at, inside, here)
-        if type(inside) in _PASSED:
-            return here
-        return self.run_one(at, inside, here)
+        if rows := routine.rows.flow.handlers:
+            yield routine.file, rows.start, rows.stop
 
     # What instructions do.
 
@@ -380,7 +356,7 @@ class RapidMachine(TaskMachine):
             effects, called = self.read_calls(names, scope)
             if effects.union(*map(self.routine_effects, called)):
                 return None
-            one = inside(one)
+            one = ir.inside(one)
             own = isinstance(one, ir.Instruction) and one.name in self.task.routines
             if isinstance(one, ir.Instruction) and not own:
                 kind = read_known_instructions().get(one.name)
@@ -400,8 +376,7 @@ class RapidMachine(TaskMachine):
         for name in (call.name for call in self.list_asked(one)):
             if name in WAITING and name not in self.task.routines:
                 self.pause(here)
-            still = name in STILL_FUNCTIONS or self.declares_motionless(name)
-            here = self.call_function(at, name, still, here)
+            here = self.call_function(at, name, here)
         self._fail(at, one, here)
         return here
 
@@ -409,23 +384,15 @@ class RapidMachine(TaskMachine):
 
     def own_effects(self, one: ir.SourceStatement) -> Effects:
         """Return that what is not understood, or called late, may move."""
-        odd = isinstance(inside(one), said.LateCall | ir.NotUnderstood)
+        odd = isinstance(ir.inside(one), said.LateCall | ir.NotUnderstood)
         return frozenset([MOVES] if odd else [])
 
-    def names_called(self, one: ir.SourceStatement) -> Iterator[str]:
-        """Yield functions, the instruction, and what a move calls by a text."""
-        yield from (call.name for call in self.list_asked(one))
-        one = inside(one)
-        if isinstance(one, ir.Instruction):
-            yield one.name
-            texts = (text for text in one.values if _is_text(text))
-            late = one.name in SYNCHRONOUS
-            yield from (_name_procedure(text) for text in texts if late)
-
-    def is_still(self, name: str) -> bool:
-        """Return True for known instructions and functions, and by the cell."""
-        known = read_known_instructions().get(name) == "still" or name in HARMLESS
-        return known or name in STILL_FUNCTIONS or self.declares_motionless(name)
+    def names_called(self, one: ir.SourceStatement) -> Iterable[str]:
+        """Add what a move calls on its way, by a text."""
+        yield from super().names_called(one)
+        one = ir.inside(one)
+        if isinstance(one, ir.Instruction) and one.name in SYNCHRONOUS:
+            yield from map(_name_procedure, filter(_is_text, one.values))
 
 
 _NO_MAIN = (

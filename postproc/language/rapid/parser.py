@@ -72,7 +72,7 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "data": _data,
     "kind": lambda c: c[0],
     "alias": lambda c: said.TypeAlias(*map(low, c[-2:])),
-    "compact_if": lambda c: said.CompactIf(*c),
+    "compact_if": lambda c: ir.CompactIf(*c),
     "on_error": lambda c: said.ErrorHandler(tuple(c)),
     "on_undo": lambda c: ir.BlockWord("undo"),
     "on_backward": lambda c: ir.BlockWord("backward"),
@@ -88,4 +88,4 @@ RULES: Mapping[str, Callable[[Children], Any]] = {
     "conditional": lambda c: _option(c[0], ir.DataObject(low(c[1])), True),
 }
 
-parse_statement = FormParser("rapid", RULES, NAMES["reserved"]).parse_statement
+parse_statement = FormParser("rapid", RULES, NAMES["reserved"]).statements

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from postproc import _native
-from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.control_flow import HeadedRows
 from postproc.language.analysis.declarations import TaskFile
@@ -14,21 +13,28 @@ from postproc.language.analysis.symbols import holds_odd
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.instructions import MOTIONS
 from postproc.language.rapid.parser import parse_statement
-from postproc.language.rapid.syntax import CompactIf
-from postproc.language.text.blocks import INNER, BlockWords, Outline
+from postproc.language.rapid.syntax import ErrorHandler
+from postproc.language.text.blocks import Outline, ScopeWords
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
 
 _SYSTEM = "sysmodule"
 _ROUTINES = ("proc", "func", "trap")
-_WORDS = BlockWords(
-    ends={
-        **INNER, "endmodule": "module", "endproc": "proc", "endfunc": "func",
+
+
+def begins_handler(one: ir.SourceStatement) -> bool:
+    """Return True if a clause behind the statements of a routine begins."""
+    return isinstance(one, ErrorHandler) or (
+        isinstance(one, ir.BlockWord) and one.word in ("undo", "backward")
+    )
+
+
+_WORDS = ScopeWords(
+    {
+        "endmodule": "module", "endproc": "proc", "endfunc": "func",
         "endtrap": "trap", "endrecord": "record",
     },
-    scopes=("module", *_ROUTINES, "record"),
-    outer=("module",),
-    routines=_ROUTINES,
+    _ROUTINES, "module", begins_handler,
 )  # fmt: skip
 
 
@@ -79,7 +85,7 @@ def read_rapid(source: Source) -> RapidFile:
     text = read_statements(source)
     outline = Outline(text, _WORDS)
     odd = text.of_kind(holds_odd)
-    called = ir.Instruction | CompactIf
+    called = ir.Instruction | ir.CompactIf
     for row in text.of_kind(lambda s: not (isinstance(s, called) or holds_odd(s))):
         outline.take(row, text.statement(row), outline.name("module"))
     outline.close()
@@ -88,28 +94,21 @@ def read_rapid(source: Source) -> RapidFile:
     within = {row for r in ended for row in range(r.first, r.last + 1)}
     moves = [row for row in text.where(is_move) if row not in within]
     for row in (row for row in text.where(_lacks_position) if row not in within):
-        outline.complain(row, Code.UNKNOWN_STATEMENT, "has too few positions")
+        outline.complain(row, "has too few positions")
     for row in (row for row in odd if row not in within):
-        outline.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
+        outline.complain(row, "is not understood")
     return RapidFile(**outline.parts(moves), modules=tuple(outline.of("module")))
-
-
-def inside(one: ir.SourceStatement) -> ir.SourceStatement:
-    """Return the statement behind a condition, the statement itself without one."""
-    while isinstance(one, CompactIf):
-        one = one.statement
-    return one
 
 
 def is_move(one: ir.SourceStatement) -> bool:
     """Return True if a statement moves, also behind a condition."""
-    one = inside(one)
+    one = ir.inside(one)
     return isinstance(one, ir.Instruction) and one.name in MOTIONS
 
 
 def _lacks_position(one: ir.SourceStatement) -> bool:
     """Return True for a move that says no destination, or no point of an arc."""
-    one = inside(one)
+    one = ir.inside(one)
     if not (isinstance(one, ir.Instruction) and is_move(one)):
         return False
     to, via = MOTIONS[one.name].operands(one.arguments)

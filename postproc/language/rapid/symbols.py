@@ -34,7 +34,7 @@ from postproc.language.rapid.instructions import (
     read_controller_data,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
-from postproc.language.rapid.program import RapidFile, inside
+from postproc.language.rapid.program import RapidFile
 from postproc.language.shifts import Shift, ShiftKind
 
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
@@ -95,7 +95,7 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     def new_uses(self) -> NamesUsed:
         """Return what knows instructions and functions by name."""
-        return _RapidUses(self.routines)
+        return _RapidUses(self.routines, self.called_elsewhere)
 
     def shares(self, file: int, datum: Datum) -> bool:
         """Return True for all but LOCAL data."""
@@ -134,25 +134,6 @@ class RapidTask(TaskSymbols[RapidFile]):
         """Add no argument where data are changed by their names in texts."""
         bound = super().bind(routine, call, there)
         return self.scope_of(routine) if self.sets_by_string and bound else bound
-
-    def is_taught(self, name: str, found: Value | None) -> bool:
-        """Return True if data were taught, by the cell or a comment on their line.
-
-        Args:
-            name: Of the data, with an index where it has one; "" for numbers in a move.
-            found: What they hold.
-        """
-        if name.split("{")[0].strip().lower() in self.start.taught:
-            return True
-        one = found
-        while isinstance(one, tuple) and one:
-            one = next((part for part in one if isinstance(part, tuple)), one[0])
-        if not isinstance(one, WrittenNumber) or one.slot < 0:
-            return False
-        file = self.numbering.file_of(one.slot)
-        text = self.files[file].text
-        row = text.row_of(one.slot - self.numbering.first[file])
-        return not self.taught_lines[file].isdisjoint(text.lines(row))
 
     # What other tasks do: global persistents of one name are the same data.
 
@@ -223,21 +204,15 @@ class RapidTask(TaskSymbols[RapidFile]):
     @cached_property
     def calls_by_text(self) -> bool:
         """Whether a procedure is called by a name in a text."""
-        found = (inside(one) for file in self.files for one in file.text.said.said)
+        found = (ir.inside(one) for file in self.files for one in file.text.said.said)
         late = any(isinstance(one, said.LateCall) for one in found)
         return late or bool({BY_NAME, *SYNCHRONOUS} & self.find_calls)
 
     @cached_property
     def find_calls(self) -> frozenset[str]:
         """Names of all instructions."""
-        found = (inside(one) for file in self.files for one in file.text.said.said)
+        found = (ir.inside(one) for file in self.files for one in file.text.said.said)
         return frozenset(o.name for o in found if isinstance(o, ir.Instruction))
-
-    @cached_property
-    def loop_variables(self) -> frozenset[str]:
-        """Names of all variables of loops."""
-        found = (one for file in self.files for one in file.text.said.said)
-        return frozenset(o.name for o in found if isinstance(o, ir.ForLoop))
 
     @cached_property
     def twins(self) -> frozenset[str]:
@@ -330,10 +305,6 @@ class _RapidUses(NamesUsed):
             return None
         point, *others = operand.values or (None,)
         return point, others
-
-    def is_passed(self, routine: TaskRoutine) -> bool:
-        """Return True but for a local one, which need not be what is called."""
-        return not routine.rows.head.local
 
 
 def as_assignment(

@@ -16,14 +16,6 @@ class TypeAlias(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class CompactIf(SourceStatement):
-    """``IF condition statement;``."""
-
-    condition: Operand
-    statement: SourceStatement
-
-
-@dataclass(frozen=True, slots=True)
 class ConnectTrap(SourceStatement):
     """``CONNECT interrupt WITH trap;``."""
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,35 +11,38 @@ import numpy as np
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language import ir
-from postproc.language.analysis.control_flow import ENDS, HeadedRows
+from postproc.language.analysis.control_flow import (
+    ENDS,
+    ControlFlow,
+    FlowReader,
+    HeadedRows,
+    is_structural,
+)
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
-INNER = {end: kind for kind, end in ENDS.items()}
-DIVIDED = {"elseif": "if", "else": "if", "case": "test", "default": "test"}
-
 
 @dataclass(frozen=True)
-class BlockWords:
-    """The words that blocks of a language end with.
+class ScopeWords:
+    """The words that modules, routines and records of a language end with.
 
     Attributes:
-        ends: From a word to the kind of block that it ends.
-        scopes: Kinds of modules, routines and records.
-        outer: Those of them that hold others.
-        routines: Those that run.
+        ends: From a word to the kind that it ends.
+        routines: Those kinds that run.
+        outer: The one that holds others, "" where there is none.
+        handles: Tells what begins a clause behind the statements of a routine.
     """
 
     ends: Mapping[str, str]
-    scopes: Collection[str]
-    outer: Collection[str]
     routines: Collection[str]
+    outer: str = ""
+    handles: Callable[[ir.SourceStatement], bool] = lambda one: False
 
 
 @dataclass
 class Outline:
-    """Modules, routines, records and blocks of a file, as they are met.
+    """Modules, routines and records of a file with their blocks, as they are met.
 
     Attributes:
         text: Its statements.
@@ -50,11 +53,26 @@ class Outline:
     """
 
     text: StatementText[Any]
-    words: BlockWords
+    words: ScopeWords
     scopes: dict[str, list[HeadedRows]] = field(default_factory=dict)
     data: list[Datum] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     _open: list[tuple[str, int, ir.SourceStatement]] = field(default_factory=list)
+    _blocks: FlowReader = field(default_factory=FlowReader)
+    _before: ControlFlow | None = None  # the handlers of the routine
+
+    def __post_init__(self) -> None:
+        """Read blocks from the first statement on."""
+        self._begin_blocks()
+
+    def _begin_blocks(self) -> None:
+        self._blocks = FlowReader(self.text.line, tell_open=self._tell_open)
+        self._before = None
+
+    def _tell_open(self, row: int, kind: str) -> str:
+        """Say that a block, a routine or a module is not closed."""
+        words = {kind: word for word, kind in self.words.ends.items()} | ENDS
+        return f"{self.text.quote(row)} has no {words[kind].upper()}"
 
     def of(self, *kinds: str) -> list[HeadedRows]:
         """Return the scopes of some kinds, in the order of the file."""
@@ -66,11 +84,6 @@ class Outline:
         heads = (said for kind, _, said in reversed(self._open) if kind in kinds)
         return getattr(next(heads, None), "name", "")
 
-    @property
-    def routine(self) -> str:
-        """The name of the routine that is open, "" without one."""
-        return self.name(*self.words.routines)
-
     def take(self, row: int, one: ir.SourceStatement, module: str) -> None:
         """Take the next statement.
 
@@ -81,45 +94,33 @@ class Outline:
         """
         match one:
             case ir.Declaration():
-                self.data += list_data(one, row, module, self.routine)
+                routine = self.name(*self.words.routines)
+                self.data += list_data(one, row, module, routine)
             case ir.ScopeHead(kind=kind) | ir.RoutineHead(kind=kind):
                 self.begin(kind, row, one)
-            case ir.ForLoop():
-                self.open("for", row, one)
-            case ir.Branch(word=word) if word in self.words.ends.values():
-                self.open(word, row, one)
-            case ir.Branch(word=word) | ir.BlockWord(word=word):
-                self.word(word, row)
+            case ir.BlockWord(word=word) if word in self.words.ends:
+                self._end(word, row)
             case ir.NotUnderstood():
-                self.complain(row, Code.UNKNOWN_STATEMENT, "is not understood")
+                self.complain(row, "is not understood")
+            case _ if self.words.handles(one) and self._open:
+                first = self._open[-1][1] + 1
+                self._before = self._before or self._blocks.flow(first, row)
+            case _ if is_structural(one):
+                self._blocks.take(row, one)
 
     def begin(self, kind: str, row: int, said: ir.SourceStatement) -> None:
         """Open a scope: routines and records stand in outer ones only."""
         kinds = [kind for kind, _, _ in self._open]
-        if kind in self.words.outer:
-            self._close_until(0, row - 1)
-        elif any(one not in self.words.outer for one in kinds):
-            around = sum(one in self.words.outer for one in kinds)
-            self._close_until(around, row - 1)
-        self.open(kind, row, said)
-
-    def open(self, kind: str, row: int, said: ir.SourceStatement) -> None:
-        """Open a block."""
+        inside = kind != self.words.outer and kinds[:1] == [self.words.outer]
+        self._close_until(int(inside), row - 1)
+        self._find_flow(row, row)
         self._open.append((kind, row, said))
-
-    def word(self, word: str, row: int) -> None:
-        """Divide or end a block."""
-        kinds = [kind for kind, _, _ in self._open]
-        if word in DIVIDED:
-            if kinds[-1:] != [DIVIDED[word]]:
-                text = f"stands in no {DIVIDED[word].upper()}"
-                self.complain(row, Code.OPEN_BLOCK, text)
-        elif word in self.words.ends:
-            self._end(word, row, kinds)
 
     def close(self) -> None:
         """Close what the file leaves open."""
         self._close_until(0, len(self.text) - 1)
+        self._find_flow(0, len(self.text))
+        self._blocks = FlowReader()  # the other one holds this outline
 
     def parts(self, moves: Sequence[int]) -> dict[str, Any]:
         """Return what every `TaskFile` holds, its moves at these rows."""
@@ -131,37 +132,44 @@ class Outline:
             "diagnostics": tuple(sorted({*self.diagnostics})),
         }
 
-    def _end(self, word: str, row: int, kinds: Sequence[str]) -> None:
-        kind, scopes = self.words.ends[word], self.words.scopes
-        last = max((k + 1 for k, own in enumerate(kinds) if own in scopes), default=0)
-        inner = kinds if kind in scopes else kinds[last:]
-        if kind not in inner:
-            self.complain(row, Code.OPEN_BLOCK, f"ends no {kind.upper()}")
+    def _end(self, word: str, row: int) -> None:
+        """End a scope, and what is left open within it."""
+        kinds, kind = [kind for kind, _, _ in self._open], self.words.ends[word]
+        if kind not in kinds:
+            self._refuse(row, f"{self.text.quote(row)} ends no {kind.upper()}")
             return
-        at = len(kinds) - 1 - list(reversed(kinds)).index(kind)
-        self._close_until(at + 1, row - 1)
-        self._close(self._open.pop(), row)
+        self._close_until(kinds.index(kind) + 1, row - 1)
+        self._close(row)
 
     def _close_until(self, depth: int, row: int) -> None:
         """Close what stands open deeper than a depth, with a message."""
-        words = {kind: word for word, kind in self.words.ends.items()}
         while len(self._open) > depth:
-            kind, begun, said = self._open.pop()
-            self.complain(begun, Code.OPEN_BLOCK, f"has no {words[kind].upper()}")
-            self._close((kind, begun, said), row, ended=False)
+            kind, begun, _ = self._open[-1]
+            self._refuse(begun, self._tell_open(begun, kind))
+            self._close(row, ended=False)
 
-    def _close(
-        self, block: tuple[str, int, ir.SourceStatement], row: int, ended: bool = True
-    ) -> None:
-        kind, begun, said = block
-        if kind in self.words.scopes:
-            scope = HeadedRows(said, begun, row, ended)
-            self.scopes.setdefault(kind, []).append(scope)
+    def _close(self, row: int, ended: bool = True) -> None:
+        """Close the innermost scope."""
+        kind, begun, said = self._open.pop()
+        flow = self._find_flow(begun + 1, row)
+        scope = HeadedRows(said, begun, row, ended, flow)
+        self.scopes.setdefault(kind, []).append(scope)
 
-    def complain(self, row: int, code: Code, what: str) -> None:
-        """Say what is wrong with a statement."""
-        message = f"{self.text.quote(row)} {what}"
-        self.diagnostics.append(self.text.diagnostic(row, code, message))
+    def _find_flow(self, first: int, end: int) -> ControlFlow:
+        """Return the blocks read so far: of statements, and the handlers behind."""
+        flow, before = self._blocks.flow(first, end), self._before
+        for row, what in flow.problems:
+            self._refuse(row, what)
+        self._begin_blocks()
+        return replace(before, handlers=range(before.last, end)) if before else flow
+
+    def _refuse(self, row: int, what: str) -> None:
+        self.diagnostics.append(self.text.diagnostic(row, Code.OPEN_BLOCK, what))
+
+    def complain(self, row: int, what: str) -> None:
+        """Say what is wrong with a statement that is not understood."""
+        text = f"{self.text.quote(row)} {what}"
+        self.diagnostics.append(self.text.diagnostic(row, Code.UNKNOWN_STATEMENT, text))
 
 
 def check_blocks(file: TaskFile) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,6 +16,9 @@ from postproc.language.text.grammars import line_parser
 from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.templates import open_name
 
+LONGEST = 1 << 18  # characters of a form; arrays of a thousand targets have 60,000
+DEEPEST = 200  # operators or brackets within each other; followed by recursion
+KEPT = 8192  # forms of which is known what they say
 Children = Sequence[Any]
 FAILED = object()
 """What stands for a form that a grammar cannot read."""
@@ -48,21 +52,17 @@ class FormParser:
         grammar: Its name.
         rules: What each rule makes of what its children gave.
         reserved: Words that name nothing.
-        longest: Characters of a form, at the most.
-        deepest: Operators or brackets within each other; followed by recursion.
         start: The start symbol of the grammar.
     """
 
     grammar: str
     rules: Mapping[str, Callable[[Children], Any]]
-    reserved: Collection[str]
-    longest: int = 1 << 18  # arrays of a thousand targets have 60,000
-    deepest: int = 200
+    reserved: Collection[str] = ()
     start: str = "statement"
 
     def parse(self, form: str) -> object:
         """Build what a form says, `FAILED` where the grammar cannot read it."""
-        if len(form) > self.longest:
+        if len(form) > LONGEST:
             return FAILED
         try:
             return self._build(line_parser(self.grammar, self.start).parse(form))
@@ -73,14 +73,24 @@ class FormParser:
     def parse_statement(self, form: str) -> SourceStatement:
         """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
         found = self.parse(form)
-        return found if isinstance(found, SourceStatement) else NotUnderstood()
+        if isinstance(found, SourceStatement):
+            return found
+        numbered = count()
+        return NotUnderstood(
+            re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
+        )
+
+    @property
+    def statements(self) -> Callable[[str], SourceStatement]:
+        """What parses the forms of statements, each once."""
+        return lru_cache(KEPT)(self.parse_statement)
 
     def _build(self, tree: lark.Tree[lark.Token]) -> object:
         """Build what a tree says, counting its names and its numbers."""
         names, slots = count(), count()
 
         def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
-            if depth > self.deepest:
+            if depth > DEEPEST:
                 raise DeeperError
             if isinstance(node, lark.Token):
                 if node.type == "NUMBER":

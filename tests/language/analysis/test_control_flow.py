@@ -8,8 +8,7 @@ from postproc.language import ir
 from postproc.language.analysis.control_flow import (
     EXIT,
     ControlFlow,
-    HeadedRows,
-    flow_of,
+    FlowReader,
 )
 from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
@@ -29,9 +28,10 @@ WORDS = {
 
 
 def flow(words: str) -> ControlFlow:
-    said = [ir.SourceStatement(), *(WORDS[word] for word in words.split())]
-    rows = HeadedRows(None, 0, len(said))
-    return flow_of(said.__getitem__, range(1, len(said)), rows)
+    reader, said = FlowReader(), [WORDS[word] for word in words.split()]
+    for row, one in enumerate(said, start=1):
+        reader.take(row, one)
+    return reader.flow(1, len(said) + 1)
 
 
 def test_blocks_within_blocks_close_in_their_order() -> None:
@@ -66,7 +66,7 @@ def test_a_word_leaves_the_innermost_loop() -> None:
 )
 def test_what_fits_nowhere_is_told_and_closes_nothing(words: str, lost: set[int]):
     found = flow(words)
-    assert lost == {row for row, _ in found.problems}
+    assert lost == {row for row, _ in (*found.problems, *found.nowhere)}
     if words.startswith("while"):
         assert found.end == {1: 4}
 

@@ -62,6 +62,7 @@ STEADY = {
     "own": ("DECL INT I", "step( )", "DEF step( )\nI=5\nEND\n"),
     "calls-nothing": ("", "N=N2", "DEF step( )\nI=5\nEND\n"),
     "calls": ("", "step( )", "DEF step( )\nN=5\nEND\n"),
+    "changed-elsewhere": ("I=7", "step( )", "DEF step( )\nN=5\nEND\n"),
 }
 
 
@@ -92,7 +93,7 @@ def test_a_routine_that_calls_itself_begins_where_it_does_so(called):
 
 
 def test_a_loop_of_a_routine_that_calls_itself_begins_again():
-    more = "DEF sub( )\nFOR I=1 TO 2\nLIN XS[I]\nsub( )\nENDFOR\nEND\n"
+    more = "DEF sub( )\nDECL INT I\nFOR I=1 TO 2\nLIN XS[I]\nsub( )\nENDFOR\nEND\n"
     found = job(*FRAMES, "sub( )", more=more)
     assert ELSEWHERE not in reached(found, "xs[1]")[0]
     assert 0 in reached(found, "xs[1]")[0]

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from postproc.language.language import Start
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.language import JobReading, Start
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
@@ -38,7 +38,7 @@ def with_values(case: str) -> tuple[str, str]:
     return program, values
 
 
-def described(resolved: Resolved, *texts: str) -> str:
+def described(resolved: JobReading, *texts: str) -> str:
     """Return one line for each visit, then one for each diagnostic."""
     v = resolved.visits
     out = []

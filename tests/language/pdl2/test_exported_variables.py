@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.language import Start
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.language import JobReading, Start
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.text.source import Source, source_from_bytes
@@ -22,7 +22,9 @@ VALUES = """g POS Arm: 1 Xport
 """
 
 
-def followed(*body: str, head: list[str], values: str = "", **said: object) -> Resolved:
+def followed(
+    *body: str, head: list[str], values: str = "", **said: object
+) -> JobReading:
     text = program("job", head, list(body))
     files = [source_from_bytes("job.lsv", values.encode())] if values else []
     start = Start(**said)  # type: ignore[arg-type]
@@ -30,7 +32,7 @@ def followed(*body: str, head: list[str], values: str = "", **said: object) -> R
     return resolve(found, start, *map(read_variables, files))
 
 
-def places(found: Resolved) -> list[float]:
+def places(found: JobReading) -> list[float]:
     """Return x of every target that is known, 0 of others."""
     v = found.visits
     known = (v.target.meaning == Meaning.POSE) & (v.target.literal >= 0)

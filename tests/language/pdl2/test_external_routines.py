@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from postproc.language.language import Start
+from postproc.language.language import JobReading, Start
 from postproc.language.pdl2.external_routines import list_motionless
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.text.source import Source
 from postproc.language.visits import ELSEWHERE, START
@@ -24,16 +24,16 @@ HEAD = [
 ]
 
 
-def followed(*body: str, head: list[str] = HEAD, **said: object) -> Resolved:
+def followed(*body: str, head: list[str] = HEAD, **said: object) -> JobReading:
     text = program("job", head, list(body))
     return resolve(parse(Source("job.pdl", text.encode())), Start(**said))  # type: ignore[arg-type]
 
 
-def reasons(found: Resolved) -> list[str]:
+def reasons(found: JobReading) -> list[str]:
     return [found.visits.reasons[k].text for k in found.visits.reason.tolist()]
 
 
-def codes(found: Resolved) -> list[str]:
+def codes(found: JobReading) -> list[str]:
     return [d.code for d in found.diagnostics]
 
 

@@ -76,7 +76,7 @@ def test_a_line_of_more_terms_than_are_followed_is_listed(n, job_cell):
 
 def test_a_line_that_no_program_has_is_not_even_parsed(monkeypatch):
     monkeypatch.setattr(template_parser, "line_parser", lambda *named: pytest.fail())
-    text = "n := " + "n + " * (1 << 16) + "n"
+    text = "n := " + "n + " * (template_parser.LONGEST // 4) + "n"
     assert isinstance(parser.parse_form(text), ir.NotUnderstood)
 
 

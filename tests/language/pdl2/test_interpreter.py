@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from postproc.language.language import Start
+from postproc.language.language import JobReading, Start
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.machine import Machine
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.text.source import source_from_bytes
@@ -24,11 +24,11 @@ def program(text: str, name: str = "job") -> Program:
     return parse(source_from_bytes(f"{name}.pdl", text.encode("latin-1")))
 
 
-def body(text: str, start: Start | None = None, declared: str = "") -> Resolved:
+def body(text: str, start: Start | None = None, declared: str = "") -> JobReading:
     return resolve(program(f"PROGRAM a\n{declared}\nBEGIN\n{text}\nEND a"), start)
 
 
-def reasons(found: Resolved) -> list[str]:
+def reasons(found: JobReading) -> list[str]:
     return [found.visits.reasons[i].text for i in found.visits.reason]
 
 

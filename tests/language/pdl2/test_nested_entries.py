@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from postproc.language.language import Start
+from postproc.language.language import JobReading, Start
 from postproc.language.pdl2.clones import copy_entry
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
@@ -45,13 +45,13 @@ def read(text: str) -> VariableFile:
     return read_variables(source_from_bytes("job.lsv", text.encode("latin-1")))
 
 
-def followed(values: str, *lines: str) -> Resolved:
+def followed(values: str, *lines: str) -> JobReading:
     text = HEAD + "\n".join([*lines, "END job"])
     program = parse(source_from_bytes("job.pdl", text.encode()))
     return resolve(program, CELL, read(values))
 
 
-def known(found: Resolved) -> list[float | int]:
+def known(found: JobReading) -> list[float | int]:
     """Return x of every target that may be edited, UNKNOWN for all others."""
     v = found.visits
     free = [k >= 0 and not v.literals.pinned[k] for k in v.target.literal.tolist()]

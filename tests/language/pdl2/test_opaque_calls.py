@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.language import JobReading
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.text.source import Source
 from postproc.language.visits import ELSEWHERE, Meaning
@@ -25,16 +26,16 @@ def routine(name: str, *body: str, takes: str = "") -> list[str]:
     return [f"ROUTINE {name}{takes}", "BEGIN", *body, f"END {name}"]
 
 
-def resolved(main: str, **pages: str) -> Resolved:
+def resolved(main: str, **pages: str) -> JobReading:
     found = {n: parse(Source(f"{n}.pdl", t.encode())) for n, t in pages.items()}
     return resolve(parse(Source("job.pdl", main.encode())), others=found)
 
 
-def codes(found: Resolved) -> set[str]:
+def codes(found: JobReading) -> set[str]:
     return {d.code for d in found.diagnostics}
 
 
-def last(found: Resolved, file: int = 0) -> tuple[Meaning, list[int], str]:
+def last(found: JobReading, file: int = 0) -> tuple[Meaning, list[int], str]:
     """Return target, origins and reason of the last visit in a file."""
     v = found.visits
     row = max(n for n in range(len(v)) if v.place.file[n] == file)

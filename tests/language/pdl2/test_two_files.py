@@ -2,7 +2,8 @@
 
 import pytest
 
-from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.language import JobReading
+from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.text.source import source_from_bytes
@@ -16,7 +17,7 @@ q POS Priv
 """
 
 
-def job(assigned: str) -> Resolved:
+def job(assigned: str) -> JobReading:
     text = f"PROGRAM job\nVAR p, q: POSITION\nBEGIN\n{assigned}\n"
     text += "MOVE LINEAR TO p\nMOVE LINEAR TO q\nEND job\n"
     values = read_variables(source_from_bytes("job.lsv", VALUES))

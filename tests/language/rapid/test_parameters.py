@@ -163,6 +163,13 @@ def test_a_local_routine_of_another_module_is_not_what_is_called():
     assert not free(found, "q") and "may be changed" in "".join(reasons(found))
 
 
+def test_a_local_routine_that_its_own_module_alone_calls():
+    found = once("go p1;", L.format("p2"), more="LOCAL " + GO)
+    assert names(found) == ["p1", "p2"] and free(found, "p1")
+    other = "MODULE o\nPROC o()\ngo p1;\nENDPROC\nENDMODULE\n"
+    assert not free(once("go p1;", more="LOCAL " + GO, others=[other]), "p1")
+
+
 def test_a_number_that_its_routine_counts_up():
     more = routine("at", "n:=n+1;", "MoveL Offs(p1,n,0,0),v9,fine,t\\WObj:=w;",
                    given="(num n)")  # fmt: skip

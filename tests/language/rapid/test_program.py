@@ -10,9 +10,8 @@ from hypothesis import example, given, settings
 
 from postproc.exceptions import ProgramError
 from postproc.language import ir
-from postproc.language.rapid import syntax as said
 from postproc.language.rapid.instructions import MOTIONS
-from postproc.language.rapid.program import inside, read_rapid
+from postproc.language.rapid.program import read_rapid
 from postproc.language.text.source import Edit, Replacements, Source, Span, apply
 from tests.language.rapid.test_statements import TEXTS
 from tests.reference.statements import statements
@@ -92,7 +91,7 @@ def test_no_statement_that_may_move_is_passed_in_silence(path):
     listed = {one.line for one in file.diagnostics}
     for row in range(len(file.text)):
         statement = file.text.statement(row)
-        while isinstance(statement, said.CompactIf):
+        while isinstance(statement, ir.CompactIf):
             statement = statement.statement
         quiet = row not in seen and file.text.line(row) not in listed
         if quiet and not in_record(file, row):
@@ -125,13 +124,13 @@ def test_statements_and_moves_are_counted(path):
 def test_moves_with_their_positions():
     file = read(WELDING)
     moves = [file.text.statement(row) for row in file.moves]
-    named = {inside(move).name: inside(move) for move in moves}
+    named = {ir.inside(move).name: ir.inside(move) for move in moves}
     assert set(named) == {"moveabsj", "movej", "movel", "arclstart", "arcc", "searchl"}
     to, _ = MOTIONS["searchl"].operands(named["searchl"].arguments)
     assert to == ir.DataObject("p10") and not MOTIONS["searchl"].reaches
     ends = MOTIONS["arcc"].operands(named["arcc"].arguments)
     assert all(isinstance(end, ir.Composite) for end in ends)
-    (shifted,) = (inside(one) for one in moves if isinstance(one, said.CompactIf))
+    (shifted,) = (ir.inside(one) for one in moves if isinstance(one, ir.CompactIf))
     to, _ = MOTIONS[shifted.name].operands(shifted.arguments)
     assert isinstance(to, ir.FunctionCall) and to.name == "offs"
     wobj = next(a for a in shifted.arguments if a.name == "wobj")
@@ -177,8 +176,8 @@ def test_a_milling_job_has_one_shape():
     ("body", "code", "text"),
     [
         ("IF a THEN MoveL p1,v1,z1,t;", "open-block", "'IF a THEN' has no ENDIF"),
-        ("ENDFOR", "open-block", "'ENDFOR' ends no FOR"),
-        ("CASE 1:", "open-block", "'CASE 1:' stands in no TEST"),
+        ("ENDFOR", "open-block", "this ENDFOR closes or divides no"),
+        ("CASE 1:", "open-block", "this CASE closes or divides no block"),
         ("MoveC p1;", "unknown-statement", "'MoveC p1;' has too few positions"),
         ("MoveL p1 v1;", "unknown-statement", "'MoveL p1 v1;' is not understood"),
     ],

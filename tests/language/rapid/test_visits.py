@@ -603,3 +603,10 @@ def test_a_task_that_is_followed_again_reads_its_tools_anew():
         assert known
         known.update(dict.fromkeys(known, None))
     assert follow(RapidMachine, found).visits[0].tool == first.visits[0].tool
+
+
+@pytest.mark.parametrize("k", ["k", "k1"])
+def test_a_constant_that_a_loop_hides_tells_no_element(k):
+    loop = (f"FOR {k} FROM 1 TO n DO", L.format(f"list{{{k}}}"), "ENDFOR")
+    found = once(*loop, more=f"VAR num n;\nCONST num {k}:=1;")
+    assert names(found) == ["list"] and all(reasons(found))
