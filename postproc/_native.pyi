@@ -424,6 +424,9 @@ def rewrite_numbers(
 # table.rs: rows of reports and records as text (`postproc.arrays`)
 def table(n: int, columns: Sequence[Cells], given: Mapping[int, bytes]) -> bytes: ...
 
+# rows.rs: how many cores work on rows (`postproc.threads`)
+def use_cores(most: int) -> None: ...
+
 # heap.rs: memory that is not used any more (`postproc.arrays`)
 def give_back() -> None: ...
 

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from postproc.operating_system import count_cores
+
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
@@ -115,6 +117,16 @@ def one_thread() -> Iterator[None]:
         yield
     finally:
         _POOLS.give_back()
+
+
+def share_cores(processes: int) -> None:
+    """Let the native core use as many threads as one of some processes has cores.
+
+    Processes that are forked from this one from now on do the same.
+    """
+    from postproc import _native  # loads numpy, which reads the pools' sizes then
+
+    _native.use_cores(max(count_cores() // processes, 1))
 
 
 def in_one_thread(work: Callable[P, R]) -> Callable[P, R]:

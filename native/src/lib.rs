@@ -70,6 +70,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(chain::torque, module)?)?;
     module.add_function(wrap_pyfunction!(commands::commands, module)?)?;
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
+    module.add_function(wrap_pyfunction!(rows::use_cores, module)?)?;
     module.add_function(wrap_pyfunction!(rounding::rounded, module)?)?;
     module.add_function(wrap_pyfunction!(zones::zones, module)?)?;
     module.add_function(wrap_pyfunction!(lines::lines, module)?)?;

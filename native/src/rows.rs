@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{available_parallelism, scope};
 
 use numpy::ndarray::{Array2, Array3, Dimension};
@@ -93,9 +94,22 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
         .map_err(|_| PyRuntimeError::new_err("the native core has failed"))
 }
 
+/// Cores that rows are worked on by at the most; 0: all that there are.
+static MOST: AtomicUsize = AtomicUsize::new(0);
+
+/// Let rows be worked on by so many cores at the most, 0 for all: other processes work
+/// on the others.
+#[pyfunction]
+pub fn use_cores(most: usize) {
+    MOST.store(most, Ordering::Relaxed);
+}
+
 /// Cut rows into a part for every core, as far as so many rows are worth a thread.
 pub fn parts_of(rows: Range<usize>, least: usize) -> Vec<Range<usize>> {
-    let cores = available_parallelism().map_or(1, usize::from);
+    let mut cores = available_parallelism().map_or(1, usize::from);
+    if let most @ 1.. = MOST.load(Ordering::Relaxed) {
+        cores = cores.min(most);
+    }
     let parts = cores.min(rows.len() / least).max(1);
     let end = |part: usize| rows.start + rows.len() * part / parts;
     (0..parts).map(|part| end(part)..end(part + 1)).collect()

@@ -35,7 +35,7 @@ from postproc.exceptions import PostprocError
 from postproc.language.languages import file_named
 from postproc.operating_system import end_with_parent, start_worker_server
 from postproc.robot.pose import MM
-from postproc.threads import start_no_threads
+from postproc.threads import share_cores, start_no_threads
 
 # Tasks in chunks that last about a second each.
 
@@ -384,8 +384,9 @@ class LocalPool:
         self._pool = self._open()
 
     def _open(self) -> ProcessPoolExecutor:
+        given = self._setups, self._jobs
         return ProcessPoolExecutor(
-            self._jobs, self._context, initializer=_begin, initargs=(self._setups,)
+            self._jobs, self._context, initializer=_begin, initargs=given
         )
 
     def lanes(self) -> int:
@@ -417,10 +418,11 @@ class LocalPool:
         ending.join()
 
 
-def _begin(setups: Sequence[JobSetup]) -> None:
-    """Make a new process a worker."""
+def _begin(setups: Sequence[JobSetup], jobs: int) -> None:
+    """Make a new process one of some workers."""
     global _setups
     _setups = setups
+    share_cores(jobs)
     import_module(READY)  # a worker that was not forked has not loaded it
     # Ctrl-C goes to the whole group: the parent decides what becomes of us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -27,6 +27,7 @@ from postproc.operating_system import (
     end_with_parent,
     hold_signals,
 )
+from postproc.threads import share_cores
 
 # Work in a forked child: it sees all that was read before, and sends what it makes.
 #
@@ -254,6 +255,8 @@ def in_processes(
     own, *others = parts_of(windows, processes)
     found: list[D] = []
     with ExitStack() as children:
+        children.callback(share_cores, 1)
+        share_cores(1 + len(others))
         ahead = [
             children.enter_context(
                 in_worker(partial(_work_ahead, work, part), len(part))
