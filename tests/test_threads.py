@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from postproc import _native, threads
 from postproc.threads import POOLS
 
 SIZES = """
@@ -104,3 +105,12 @@ def test_where_the_environment_says_it_nothing_is_looked_for():
             capture_output=True, text=True, check=True, env=told | said,
         )  # fmt: skip
         assert done.stdout.split() == [loaded]
+
+
+def test_processes_share_the_cores(monkeypatch) -> None:
+    seen: list[int] = []
+    monkeypatch.setattr(_native, "use_cores", seen.append)
+    monkeypatch.setattr(threads, "count_cores", lambda: 8)
+    for processes in (3, 16, 1):
+        threads.share_cores(processes)
+    assert seen == [2, 1, 8]
