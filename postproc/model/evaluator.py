@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,8 +47,7 @@ class CoreStates:
     given: Floats
 
 
-@dataclass(frozen=True)
-class PredictedErrors:
+class PredictedErrors(NamedTuple):
     """Predicted errors of n states, NaN where nobody has asked.
 
     Attributes:
@@ -73,8 +72,7 @@ class PredictedErrors:
 
     def copy(self) -> PredictedErrors:
         """Return predictions that can change on their own."""
-        columns = self.error, self.known, self.arrival
-        return PredictedErrors(*map(np.array, columns))
+        return PredictedErrors(*map(np.array, self))
 
     @property
     def std(self) -> Floats:
