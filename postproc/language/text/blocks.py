@@ -96,12 +96,8 @@ class Outline:
 
     def begin(self, kind: str, row: int, said: ir.SourceStatement) -> None:
         """Open a scope: routines and records stand in outer ones only."""
-        kinds = [kind for kind, _, _ in self._open]
-        if kind in self.words.outer:
-            self._close_until(0, row - 1)
-        elif any(one not in self.words.outer for one in kinds):
-            around = sum(one in self.words.outer for one in kinds)
-            self._close_until(around, row - 1)
+        around = [one for one, _, _ in self._open if one in self.words.outer]
+        self._close_until(0 if kind in self.words.outer else len(around), row - 1)
         self.open(kind, row, said)
 
     def open(self, kind: str, row: int, said: ir.SourceStatement) -> None:
