@@ -50,19 +50,20 @@ def test_other_numbers_are_read_as_by_themselves(
     if found is None:  # only where another number makes another line of it
         assert said(after)[stamped:] != said(before)
         return
-    assert found.added == (0 if stamped else -1)
+    lines, changed, added = found
+    assert added == (0 if stamped else -1)
     for name in ("shape", "begin_line", "first"):
-        assert np.array_equal(getattr(found.lines, name), getattr(alone, name)), name
+        assert np.array_equal(getattr(lines, name), getattr(alone, name)), name
     for name in ("start", "end"):
-        now, meant = getattr(found.lines.numbers, name), getattr(alone.numbers, name)
+        now, meant = getattr(lines.numbers, name), getattr(alone.numbers, name)
         assert np.array_equal(now, meant), name
-    assert np.array_equal(found.lines.value, alone.value, equal_nan=True)
-    assert found.lines.shapes == alone.shapes
+    assert np.array_equal(lines.value, alone.value, equal_nan=True)
+    assert lines.shapes == alone.shapes
     texts = [
         [s.data[a:b] for a, b in zip(own.start, own.end, strict=True)]
-        for s, own in ((before, old.numbers), (after, found.lines.numbers))
+        for s, own in ((before, old.numbers), (after, lines.numbers))
     ]
-    assert found.changed.tolist() == [a != b for a, b in zip(*texts, strict=True)]
+    assert changed.tolist() == [a != b for a, b in zip(*texts, strict=True)]
 
 
 def rescanned(before: bytes, after: bytes) -> bool:
@@ -91,6 +92,7 @@ def test_long_texts_are_read_in_parts() -> None:
     before, after = Source("x", text), Source("x", STAMP + new)
     found, alone = reread_lines(after, read_lines(before)), read_lines(after)
     assert found is not None
-    assert np.array_equal(found.lines.value, alone.value)
-    assert np.array_equal(found.lines.numbers.start, alone.numbers.start)
-    assert found.changed.reshape(-1, 6).sum(axis=0).tolist() == [0, 0, 10_000, 0, 0, 0]
+    lines, changed, _ = found
+    assert np.array_equal(lines.value, alone.value)
+    assert np.array_equal(lines.numbers.start, alone.numbers.start)
+    assert changed.reshape(-1, 6).sum(axis=0).tolist() == [0, 0, 10_000, 0, 0, 0]

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints
+from postproc.arrays import Bools, Indices, Ints, spans
 from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow, FlowReader
@@ -487,10 +487,14 @@ def parse_again(source: Source, before: Program) -> Program:
         ProgramError: A string does not end on its line.
     """
     found = reread_lines(source, before.lines)
-    if found is None or found.change(_structural(before.lines)):
+    if found is None:
         return parse(source)
-    told = found.move(before.diagnostics)
-    return replace(before, lines=found.lines, diagnostics=told)
+    lines, changed, added = found
+    first, rows = lines.first.astype(np.int64), _structural(before.lines)
+    if changed[spans(first[rows], first[rows + 1] - first[rows])].any():
+        return parse(source)
+    told = (replace(d, line=d.line + (0 <= added < d.line)) for d in before.diagnostics)
+    return replace(before, lines=lines, diagnostics=tuple(told))
 
 
 def _structural(lines: ProgramLines) -> Ints:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Ints, spans
+from postproc.arrays import Bools
 from postproc.exceptions import ProgramError
 from postproc.language.text.source import NumberSpans, Source
 from postproc.language.text.statement_table import Statements
 from postproc.language.text.templates import find_shapes, parse_shapes
-from postproc.language.visits import Diagnostic
 
 T = TypeVar("T")
 
@@ -46,41 +45,18 @@ def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[
     return Statements(source, said, shape.astype(np.int32), line, first, numbers, value)
 
 
-@dataclass(frozen=True)
-class RereadLines(Generic[T]):
-    """Lines that say what they said before, but for what their numbers are worth.
-
-    Attributes:
-        lines: The lines as they are now.
-        changed: Which numbers are written otherwise, (m,).
-        added: Physical line (from 0) that was not there, -1 where there is none.
-    """
-
-    lines: Statements[T]
-    changed: Bools
-    added: int
-
-    def change(self, rows: Ints) -> bool:
-        """Tell whether any number in some logical lines is written otherwise."""
-        first = self.lines.first.astype(np.int64)
-        own = spans(first[rows], first[rows + 1] - first[rows])
-        return bool(self.changed[own].any())
-
-    def move(self, found: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
-        """Move what was found in the lines before to where these stand now."""
-        if self.added < 0:
-            return tuple(found)
-        return tuple(replace(d, line=d.line + (d.line > self.added)) for d in found)
-
-
-def reread_lines(source: Source, before: Statements[T]) -> RereadLines[T] | None:
+def reread_lines(
+    source: Source, before: Statements[T]
+) -> tuple[Statements[T], Bools, int] | None:
     """Read a text that should differ from one read before in numbers alone.
 
     Every line of both is read, but what lines have in common with those before is not
     worked out again. One line of comment may have come in, as a stamp does.
 
     Returns:
-        Its lines; None where they say anything else, or a string does not end.
+        Its lines, which of their numbers are written otherwise, (m,), and the physical
+        line (from 0) that was not there, -1 where there is none. None where lines say
+        anything else, or a string does not end.
     """
     old, count = before.source, len(before.numbers)
     found = _native.rescan_lines(
@@ -96,4 +72,4 @@ def reread_lines(source: Source, before: Statements[T]) -> RereadLines[T] | None
     lines = replace(
         before, source=source, begin_line=line, numbers=numbers, value=value
     )
-    return RereadLines(lines, changed, added)
+    return lines, changed, added
