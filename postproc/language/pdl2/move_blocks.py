@@ -43,19 +43,6 @@ _POINTS = ("position", "xtndpos", "jointpos")
 _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
 
 
-@dataclass(frozen=True)
-class PointVariable:
-    """A variable that moves go to.
-
-    Attributes:
-        key: Where it is stored; of an array's elements the beginning.
-        index: Number slots of an element's index.
-    """
-
-    key: str
-    index: tuple[int, ...]
-
-
 class PlainMoves:
     """The quiet lines of a body.
 
@@ -65,7 +52,8 @@ class PlainMoves:
         statements: What the lines of each variant say, but for numbers and points.
         forms: What moves of each variant have in common, see `_form`; None for calls.
         calls: Which of them call something.
-        points: The point that lines of a shape go to, unless `name` tells it.
+        points: Where the point is stored that lines of a shape go to, unless `name`
+            tells it; of an array's elements the beginning, and slots of the index.
         prefix: What keys of the program's own variables begin with.
         names: Names, in lower case, of the program's own variables that lines go to.
         rows: Their rows in the variable file, -1 where it tells none.
@@ -88,7 +76,7 @@ class PlainMoves:
         program, body = place.program, place.body
         self._parameters = {p.name for p in body.parameters}
         self.statements: list[ir.SourceStatement] = []
-        self.points: dict[int, PointVariable] = {}
+        self.points: dict[int, tuple[str, tuple[int, ...]]] = {}
         self.prefix, self.names = f"{program.name}/", NameColumn()
         self.first = first = body.first + 1
         shape = program.lines.shape[first : body.last]
@@ -169,7 +157,7 @@ class PlainMoves:
         self.names.extend(goal)
         for k in np.flatnonzero((points & ~alone)[which]).tolist():
             key = self._world.root(place, goal[which[k]])
-            self.points[int(shapes[k])] = PointVariable(key, index)
+            self.points[int(shapes[k])] = key, index
         found: Bools = points[which]
         return found
 
@@ -399,7 +387,7 @@ def _points(
         if name >= 0:
             key = quiet.prefix + quiet.names[name]
         else:
-            key = _key(program.lines, quiet.points[shape], int(rows[at]))
+            key = _key(program.lines, int(rows[at]), *quiet.points[shape])
         value = here.store.get_assigned(key) if key else _NO_INDEX
         point[at] = initial.point(key) if value is None else HELD
         if point[at] < 0:
@@ -425,11 +413,10 @@ def _find_assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     return found
 
 
-def _key(lines: ProgramLines, point: PointVariable, row: int) -> str:
+def _key(lines: ProgramLines, row: int, key: str, slots: tuple[int, ...]) -> str:
     """Return where the point of a move is stored, "" where its index is not known."""
-    if not point.index:
-        return point.key
-    index = [float(lines.value[lines.first[row] + slot]) for slot in point.index]
+    index = [float(lines.value[lines.first[row] + slot]) for slot in slots]
     if not all(number.is_integer() for number in index):
         return ""
-    return f"{point.key}[{','.join(str(int(number)) for number in index)}]"
+    element = ",".join(str(int(number)) for number in index)
+    return f"{key}[{element}]" if slots else key
