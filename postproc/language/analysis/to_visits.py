@@ -312,13 +312,19 @@ class Collector(ABC):
         return {name: own.astype(np.int64) for name, own in found if len(own)}
 
     def _read_measure_ids(self) -> dict[int, str]:
-        """Return the ids that comments give to visits."""
+        """Return the ids that comments give to visits: a mark counts for the next move.
+
+        It may stand before the move, or on its last line.
+        """
         ids = list[dict[int, str]]()
         for text, rows in zip(self.numbering.texts, self.list_moves(), strict=False):
             marks = [*self.comments.marks(text.source, MEASURE)]
-            ids.append(
-                find_measured(marks, text.end_line[rows] if marks else rows, rows)
-            )
+            last = text.end_line[rows] if marks else rows
+            ids.append({})
+            for line, mark in marks:
+                at = int(np.searchsorted(last, line))
+                if at < len(rows):
+                    ids[-1].setdefault(int(rows[at]), mark)
         found = dict[int, str]()
         for v, begin in zip(self.found if any(ids) else (), self.begin, strict=False):
             own = {} if v.via else ids[v.scope.file]
@@ -326,24 +332,6 @@ class Collector(ABC):
             for k in np.flatnonzero(np.isin(rows, [*own])).tolist():
                 found[int(begin) + k] = own[int(rows[k])]
         return found
-
-
-def find_measured(
-    marks: Iterable[tuple[int, str]], lines: Indices, rows: Indices
-) -> dict[int, str]:
-    """Return the ids of moves that are measured, by their rows.
-
-    Args:
-        marks: Lines that begin with MEASURE, and the ids there.
-        lines: Up to which a mark may stand before a move, or on it, ascending, (m,).
-        rows: The moves, (m,).
-    """
-    found = dict[int, str]()
-    for line, mark in marks:
-        at = int(np.searchsorted(lines, line))
-        if at < len(rows):
-            found.setdefault(int(rows[at]), mark)
-    return found
 
 
 class TaskCollector(Collector):
