@@ -127,12 +127,7 @@ class Splitter(ABC):
     # What follows from that.
 
     def hinders(self, file: int, line: int) -> str:
-        """Say what in the text of a move forbids points on its way, "" for nothing.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
-        """
+        """Say what in the text of a move forbids points on its way, "" for nothing."""
         text, row = self.find(file, line)
         move = text.statement(row)
         if not isinstance(move, self.kind) or text.line(row) != line:
@@ -144,10 +139,6 @@ class Splitter(ABC):
         """Tell whether the arm may stop once more before a move.
 
         Nothing that may begin a process stands between it and the move before.
-
-        Args:
-            file: Where the move stands.
-            line: Its line there.
         """
         text, row = self.find(file, line)
         before = map(text.statement, range(row - 1, -1, -1))

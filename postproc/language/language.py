@@ -70,14 +70,13 @@ class Start:
 
     def __post_init__(self) -> None:
         """No language tells cases apart: keep names in lower case."""
-        lower = {name.lower(): said for name, said in self.routines.items()}
-        object.__setattr__(self, "routines", lower)
-        object.__setattr__(self, "motionless", tuple(map(str.lower, self.motionless)))
-        object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
-        tables = {name.lower(): table for name, table in self.frame_tables.items()}
-        object.__setattr__(self, "frame_tables", tables)
-        taught = frozenset(name.lower() for name in self.taught)
-        object.__setattr__(self, "taught", taught)
+        for field_ in ("routines", "frame_tables"):
+            lower = {name.lower(): said for name, said in getattr(self, field_).items()}
+            object.__setattr__(self, field_, lower)
+        for field_, kind in (("motionless", tuple), ("constant", tuple),
+                             ("taught", frozenset)):  # fmt: skip
+            names = kind(name.lower() for name in getattr(self, field_))
+            object.__setattr__(self, field_, names)
 
     def effect_of(self, *names: str) -> str:
         """Return what the cell says that a routine does, "" where it says nothing.

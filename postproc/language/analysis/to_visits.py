@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import (
     Collection,
@@ -45,7 +44,6 @@ from postproc.language.analysis.visit_columns import (
 )
 from postproc.language.pose_encoding import Dialect
 from postproc.language.text.comment_directives import MEASURE, Comments
-from postproc.language.text.statement_table import StatementText
 
 ONLY_SHIFTED = Reason(
     Code.NUMBERS_NOT_OWN,
@@ -314,13 +312,19 @@ class Collector(ABC):
         return {name: own.astype(np.int64) for name, own in found if len(own)}
 
     def _read_measure_ids(self) -> dict[int, str]:
-        """Return the ids that comments give to visits."""
+        """Return the ids that comments give to visits: a mark counts for the next move.
+
+        It may stand before the move, or on its last line.
+        """
         ids = list[dict[int, str]]()
         for text, rows in zip(self.numbering.texts, self.list_moves(), strict=False):
             marks = [*self.comments.marks(text.source, MEASURE)]
-            ids.append(
-                find_measured(marks, text.end_line[rows] if marks else rows, rows)
-            )
+            last = text.end_line[rows] if marks else rows
+            ids.append({})
+            for line, mark in marks:
+                at = int(np.searchsorted(last, line))
+                if at < len(rows):
+                    ids[-1].setdefault(int(rows[at]), mark)
         found = dict[int, str]()
         for v, begin in zip(self.found if any(ids) else (), self.begin, strict=False):
             own = {} if v.via else ids[v.scope.file]
@@ -328,24 +332,6 @@ class Collector(ABC):
             for k in np.flatnonzero(np.isin(rows, [*own])).tolist():
                 found[int(begin) + k] = own[int(rows[k])]
         return found
-
-
-def find_measured(
-    marks: Iterable[tuple[int, str]], lines: Indices, rows: Indices
-) -> dict[int, str]:
-    """Return the ids of moves that are measured, by their rows.
-
-    Args:
-        marks: Lines that begin with MEASURE, and the ids there.
-        lines: Up to which a mark may stand before a move, or on it, ascending, (m,).
-        rows: The moves, (m,).
-    """
-    found = dict[int, str]()
-    for line, mark in marks:
-        at = int(np.searchsorted(lines, line))
-        if at < len(rows):
-            found.setdefault(int(rows[at]), mark)
-    return found
 
 
 class TaskCollector(Collector):
@@ -539,28 +525,16 @@ def _find_marked(places: Collection[int], machine: TaskMachine) -> set[int]:
     found, begins = set[int](), machine.task.numbering.first
     for file, lines in enumerate(machine.task.taught_lines):
         text, (begin, behind) = machine.texts[file], begins[file : file + 2]
-        inside = (slot - begin for slot in places if begin <= slot < behind)
-        own = sorted(inside) if lines else []
-        rows, of_row = {slot: text.row_of(slot) for slot in own}, defaultdict(list)
-        for slot in own:
-            of_row[rows[slot]].append(slot)
+        own = sorted(slot - begin for slot in places if begin <= slot < behind)
+        own, on_line, of_row = own if lines else [], defaultdict(set), defaultdict(set)
+        for slot, other in zip(own, [*own[1:], behind - begin], strict=False):
+            row = text.row_of(slot)
+            of_row[row].add(begin + slot)
+            end = min(slot + MOST_NUMBERS, other, int(text.first[row + 1]))
+            starts = text.numbers.starts(slice(slot, end))
+            for line in text.source.lines_of(starts).tolist():
+                on_line[line].add(begin + slot)
         for line in lines if own else ():
-            there = _on_line(own, rows, text, line)
             near = (slot for row in text.rows_on(line) for slot in of_row[row])
-            found |= {begin + slot for slot in there or near}
-    return found
-
-
-def _on_line(
-    own: Sequence[int], rows: Mapping[int, int], text: StatementText[Any], line: int
-) -> set[int]:
-    """Return the targets, by their first numbers, with numbers on a line."""
-    starts = text.source.line_starts
-    begin, end = (*starts[line - 1 : line + 1].tolist(), len(text.source.data))[:2]
-    first, last = np.searchsorted(text.numbers.start, [begin, end]).tolist()
-    found = set[int]()
-    for slot in range(first, last):
-        at = bisect_right(own, slot) - 1
-        if at >= 0 and slot - own[at] < MOST_NUMBERS:
-            found |= {own[at]} if text.row_of(slot) == rows[own[at]] else set()
+            found |= on_line[line] or {*near}
     return found

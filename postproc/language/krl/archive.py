@@ -56,19 +56,24 @@ def read_archive(folder: Path) -> Archive | None:
     )
 
 
-def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KnownRecord]]:
-    """Yield the entries of a table that are set."""
+def _list_values(task: KrlTask, name: str) -> Iterator[tuple[int, KnownRecord]]:
+    """Yield what data of a name are given, entries of a table with their number."""
     here = Scope(0, task.files[0].name, "")
     for datum in task.files[0].data:
-        if datum.name == table and datum.index:
+        if datum.name == name and datum.value is not None:
             value = task.value(datum.value, here.at(datum.row))
-            if not isinstance(value, KnownRecord):
-                continue
-            given = any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
-            if value.get("m") is not None:
-                given = value.number("m") > 0.0
-            if given:
-                yield datum.index[0], value
+            if isinstance(value, KnownRecord):
+                yield (*datum.index, 0)[0], value
+
+
+def _entries(task: KrlTask, table: str) -> Iterator[tuple[int, KnownRecord]]:
+    """Yield the entries of a table that are set."""
+    for number, value in _list_values(task, table):
+        given = any(abs(value.number(name.lower())) > 0.0 for name in _PLACE)
+        if value.get("m") is not None:
+            given = value.number("m") > 0.0
+        if number and given:
+            yield number, value
 
 
 def _numbers_of_load(value: KnownRecord) -> tuple[float, ...]:
@@ -82,13 +87,9 @@ def _numbers_of_load(value: KnownRecord) -> tuple[float, ...]:
 
 def _home(task: KrlTask) -> tuple[float, ...]:
     """Return the joint angles of XHOME [deg], () where there are none."""
-    here = Scope(0, task.files[0].name, "")
-    for datum in task.files[0].data:
-        if datum.name == "xhome" and datum.value is not None:
-            value = task.value(datum.value, here.at(datum.row))
-            if isinstance(value, KnownRecord):
-                found = tuple(value.number(axis) for axis in AXES)
-                return () if np.isnan(found).any() else found
+    for _, value in _list_values(task, "xhome"):
+        found = tuple(value.number(axis) for axis in AXES)
+        return () if np.isnan(found).any() else found
     return ()
 
 

@@ -132,23 +132,16 @@ class FrameReader:
         if table == "base_data" and self._is_chained(number):
             chain = _CHAINED.format(f"MACHINE_FRAME_DAT[{number}]")
             return no_frame(chain, Code.EXTERNAL_AXES)
-        found = self._element(table, number)
-        return found or TaskFrame((), self._unknown(shown, table))
-
-    def _element(self, table: str, number: int) -> TaskFrame | None:
-        """Read an element of an array of frames, None where it is not known."""
         held = self._read_held(table, symbols.entry_name(table, number))
         if isinstance(held, TaskFrame) and self.task.is_global(table, self.here):
             return held
-        if not self.task.is_steady(table, number):
-            return None
         found = self.task.datum(table, self.here, (number,))
-        pose = pose_of(self.task.entry(table, number, self.here))
-        if found is None or not pose:
-            return None
-        return TaskFrame(
-            pose, taught=self.task.is_taught(table, found[0], found[1].row)
-        )
+        if found is not None and self.task.is_steady(table, number):
+            pose = pose_of(self.task.entry(table, number, self.here))
+            taught = self.task.is_taught(table, found[0], found[1].row)
+            if pose:
+                return TaskFrame(pose, taught=taught)
+        return TaskFrame((), self._unknown(shown, table))
 
     def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
@@ -173,16 +166,14 @@ class FrameReader:
         """Read a frame that is written or named."""
         value = self.task.value(operand, self.here)
         pose = pose_of(value)
-        if pose and isinstance(operand, ir.DataObject):
-            taught, found = False, self.task.datum(operand.name, self.here)
-            if found is not None:
-                taught = self.task.is_taught(operand.name, found[0], found[1].row)
-            return TaskFrame(pose, taught=taught)
+        name = operand.name if isinstance(operand, ir.DataObject) else ""
         if pose:
-            taught = self.task.is_taught("", self.here.file, self.here.row)
-            return TaskFrame(pose, taught=taught)
-        if isinstance(operand, ir.DataObject):
-            return TaskFrame((), self._unknown(operand.name.upper(), operand.name))
+            found = self.task.datum(name, self.here) if name else None
+            at = (found[0], found[1].row) if found else (self.here.file, self.here.row)
+            known = found is not None or not name
+            return TaskFrame(pose, taught=known and self.task.is_taught(name, *at))
+        if name:
+            return TaskFrame((), self._unknown(name.upper(), name))
         return no_frame("a frame is not written whole")
 
     @staticmethod

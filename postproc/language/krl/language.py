@@ -8,7 +8,7 @@ from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing
-from postproc.language import ir, language
+from postproc.language import ir
 from postproc.language.analysis.task_language import TaskLanguage
 from postproc.language.krl import syntax as said
 from postproc.language.krl.archive import read_archive
@@ -81,9 +81,7 @@ class Krl(TaskLanguage):
             return ()
         return (*named.find_shared(listing), *acting_sources(program, listing))
 
-    def read_archive(self, folder: Path) -> language.Archive | None:
-        """Read ``$config.dat`` and ``$machine.dat`` of an archive."""
-        return read_archive(folder)
+    read_archive = staticmethod(read_archive)
 
 
 LANGUAGE = Krl

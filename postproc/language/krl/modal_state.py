@@ -312,10 +312,14 @@ class ModeReader:
         value: object | None = None
         if not self.task.is_global(table, self.here):
             return modes.hold(key, value)
-        if not parts:
-            value = self._entry_value(modes, one)
-        elif table != "load_data":
+        if table == "load_data":
+            load = LOST_LOAD if parts else load_of(self._record(one.value))
+            value = None if load == LOST_LOAD else load
+        elif parts:
             value = self._component(modes.store.get(key), parts, one.value)
+        else:
+            found = self.frames(modes).frame(one.value)
+            value = None if found.why or not found.pose else found
         if isinstance(value, TaskFrame) and table in self.task.start.taught:
             value = replace(value, taught=True)
         return modes.hold(key, value)
@@ -327,14 +331,6 @@ class ModeReader:
         if len(parts) != 1 or not isinstance(parts[0], str):
             return None
         return set_component(held, parts[0], self._number(value))
-
-    def _entry_value(self, modes: KrlModes, one: ir.Assignment) -> object | None:
-        """Read the frame that an entry gets, or the mass of a load."""
-        if one.target.name == "load_data":
-            load = load_of(self._record(one.value))
-            return None if load == LOST_LOAD else load
-        found = self.frames(modes).frame(one.value)
-        return None if found.why or not found.pose else found
 
     def _hold(self, modes: KrlModes, one: ir.Assignment) -> KrlModes:
         """``M_BASE_CORR = {..}``, ``M_BAS_COR_ON = TRUE``, ``FDAT_ACT = FP1``.

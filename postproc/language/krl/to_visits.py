@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Container, Mapping, Sequence
 
 from postproc.diagnostics import NO_REASON, Code, Reason
@@ -20,7 +19,6 @@ from postproc.language.shifts import Pose
 from postproc.language.visits import Blend, Meaning, OrientationLaw, Switch
 from postproc.robot.trajectory import Motion
 
-STOP, PASS, MAYBE = "stop", "pass", "maybe"
 _IPO = Reason(Code.FRAME_UNKNOWN, "$IPO_MODE is not known here")
 _STATUS = Reason(
     Code.CONFIGURATION_UNKNOWN,
@@ -139,14 +137,14 @@ def _law(v: KrlVisit, modes: modal_state.KrlModes) -> OrientationLaw:
     return OrientationLaw.START_TO_END if known else OrientationLaw.ALONG_PATH
 
 
-def _zone(v: KrlVisit, modes: modal_state.KrlModes, end: str) -> Zone:
+def _zone(v: KrlVisit, modes: modal_state.KrlModes, stops: bool | None) -> Zone:
     """Tell how a point is passed."""
     if v.inner and not v.via:
         return zone_at(v.via, exact=True)
-    if v.via or not v.blends or end == STOP or modes.ahead is False:
+    if v.via or not v.blends or stops or modes.ahead is False:
         return zone_at(v.via)
     unsized = zone_at(v.via, unsized=True)
-    if end == MAYBE or modes.ahead is None:
+    if stops is None or modes.ahead is None:
         return unsized
     words = v.move.words
     if "c_ptp" in words and "c_dis" not in words:
@@ -161,38 +159,26 @@ def _zone(v: KrlVisit, modes: modal_state.KrlModes, end: str) -> Zone:
 # What stands behind a point decides whether it is passed.
 
 
-def _ends(found: Sequence[KrlVisit], lost: Container[int]) -> Sequence[str]:
-    """Tell of every visit whether the arm stops there, as far as what follows tells.
+def _ends(found: Sequence[KrlVisit], lost: Container[int]) -> list[bool | None]:
+    """Tell of every visit whether the arm stops there, None where that is not sure.
 
     The old planner and that of splines do not blend into each other, statements that
     wait for what runs ahead stop the arm, and so does the end of the program.
-    """
-    after: dict[int, list[KrlVisit]] = defaultdict(list)
-    for v in found:
-        for origin in v.origins:
-            after[origin].append(v)
-    return [_end(v, after[k], k in lost) for k, v in enumerate(found)]
-
-
-def _end(v: KrlVisit, after: Sequence[KrlVisit], lost: bool) -> str:
-    """Tell whether the arm stops at a visit, by those behind it.
 
     Args:
-        v: The visit.
-        after: Those behind it.
-        lost: The arm may go anywhere behind it.
+        found: The visits.
+        lost: Those behind which the arm may go anywhere.
     """
-    stops: list[bool | None] = [None] if lost else []
-    for one in after:
-        if one.by_spline_planner != v.by_spline_planner:
-            stops.append(True)
-        elif one.modes.ahead != v.modes.ahead and not one.modes.halted:
-            stops.append(None)  # whether the program waits between them is not known
-        else:
-            stops.append(one.modes.halted)
-    if all(stop is True for stop in stops):
-        return STOP
-    return PASS if all(stop is False for stop in stops) else MAYBE
+    stops = [set[bool | None]([None] if k in lost else ()) for k in range(len(found))]
+    for after in found:
+        for origin in (k for k in after.origins if k >= 0):
+            before, stop = found[origin], after.modes.halted
+            if after.by_spline_planner != before.by_spline_planner:
+                stop = True
+            elif after.modes.ahead != before.modes.ahead and not stop:
+                stop = None  # whether the program waits between them is not known
+            stops[origin].add(stop)
+    return [True if s <= {True} else False if s == {False} else None for s in stops]
 
 
 def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
@@ -244,45 +243,33 @@ def _may_be_field(entered: EntryPart | None) -> bool:
     return entered.name.startswith("$") or not entered.variable
 
 
-@dataclass(frozen=True)
-class _Read:
-    """One entry, read for all that are laid out alike.
+def _read_layout(
+    head: EntryPart, parts: Sequence[EntryPart | None], axes: Iterable[int]
+) -> tuple[Layout, Sequence[Place], Mapping[int, Place]]:
+    """Read an entry whose axes have these numbers, for all that are laid out alike.
 
-    Attributes:
-        places: Where its six numbers stand.
-        aux: Where the value of each auxiliary axis does.
-        layout: The layout.
+    Returns:
+        Its layout, where its six numbers stand, and the value of each auxiliary axis.
     """
-
-    places: tuple[Place, ...]
-    aux: Mapping[int, Place]
-    layout: Layout
-
-    @classmethod
-    def of(
-        cls, head: EntryPart, parts: Sequence[EntryPart | None], axes: Iterable[int]
-    ) -> Self:
-        """Take in all lines of an entry whose axes have these numbers."""
-        kind, numbered = kind_of(head.type)[0], iter(axes)
-        joint, places, aux = kind == "JNTP", [_NONE] * 6, dict[int, Place]()
-        config, seen = None, 0
-        for row, line in enumerate(parts):
-            if line is None:
-                continue
-            found = [(_LETTERS.index(k.upper()), slot) for k, slot in line.components]
-            for (_, slot), axis in zip(line.axes, numbered, strict=False):
-                if joint and 1 <= axis <= 6:
-                    found.append((axis - 1, slot))
-                elif axis >= 1:
-                    aux[axis - 6 if joint else axis] = row, slot
-            found += enumerate(line.plain, seen + len(found))
-            for at, slot in found:
-                if at < 6:
-                    places[at] = row, slot
-            seen += len(found)
-            config = config if line.config is None else line.config
-        layout = Layout(kind, head.shared, config, tuple(sorted(aux)), seen)
-        return cls(tuple(places), aux, layout)
+    kind, numbered = kind_of(head.type)[0], iter(axes)
+    joint, places, aux = kind == "JNTP", [_NONE] * 6, dict[int, Place]()
+    config, seen = None, 0
+    for row, line in enumerate(parts):
+        if line is None:
+            continue
+        found = [(_LETTERS.index(k.upper()), slot) for k, slot in line.components]
+        for (_, slot), axis in zip(line.axes, numbered, strict=False):
+            if joint and 1 <= axis <= 6:
+                found.append((axis - 1, slot))
+            elif axis >= 1:
+                aux[axis - 6 if joint else axis] = row, slot
+        found += enumerate(line.plain, seen + len(found))
+        for at, slot in found:
+            if at < 6:
+                places[at] = row, slot
+        seen += len(found)
+        config = config if line.config is None else line.config
+    return Layout(kind, head.shared, config, tuple(sorted(aux)), seen), places, aux
 
 
 def read_records(lines: EntryLines, records: Records) -> Entries:
@@ -300,15 +287,16 @@ def read_records(lines: EntryLines, records: Records) -> Entries:
         if head.arm >= 0:
             arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
         for some, axes in _by_axes(lines, records.first, mine, parts):
-            read, first = _Read.of(head, parts, axes), records.first[some]
-            for at, (row, slot) in enumerate(read.places):
+            own, places, named = _read_layout(head, parts, axes)
+            first = records.first[some]
+            for at, (row, slot) in enumerate(places):
                 if slot >= 0:
                     numbers[some, at] = _values(lines, first + row, slot)
                     slots[some, at] = lines.first[first + row] + slot
-            places = [read.aux[axis] for axis in read.layout.axes]
-            aux.append((some, _columns(lines, first, places)))
+            values = _columns(lines, first, [named[axis] for axis in own.axes])
+            aux.append((some, values))
             layout[some] = len(layouts)
-            layouts.append(read.layout)
+            layouts.append(own)
     stacked = np.full((k, max((v.shape[1] for _, v in aux), default=0)), np.nan)
     for rows, values in aux:
         stacked[rows, : values.shape[1]] = values

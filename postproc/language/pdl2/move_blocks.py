@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
@@ -42,19 +43,6 @@ _POINTS = ("position", "xtndpos", "jointpos")
 _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
 
 
-@dataclass(frozen=True)
-class PointVariable:
-    """A variable that moves go to.
-
-    Attributes:
-        key: Where it is stored; of an array's elements the beginning.
-        index: Number slots of an element's index.
-    """
-
-    key: str
-    index: tuple[int, ...]
-
-
 class PlainMoves:
     """The quiet lines of a body.
 
@@ -62,10 +50,10 @@ class PlainMoves:
         first: Row of the first line that `variant` tells of.
         variant: Index into `statements` of every row, (n,), -1 where it is not quiet.
         statements: What the lines of each variant say, but for numbers and points.
-        forms: What moves of each variant have in common, but for their trajectory;
-            None for calls.
+        forms: What moves of each variant have in common, see `_form`; None for calls.
         calls: Which of them call something.
-        points: The point that lines of a shape go to, unless `name` tells it.
+        points: Where the point is stored that lines of a shape go to, unless `name`
+            tells it; of an array's elements the beginning, and slots of the index.
         prefix: What keys of the program's own variables begin with.
         names: Names, in lower case, of the program's own variables that lines go to.
         rows: Their rows in the variable file, -1 where it tells none.
@@ -88,7 +76,7 @@ class PlainMoves:
         program, body = place.program, place.body
         self._parameters = {p.name for p in body.parameters}
         self.statements: list[ir.SourceStatement] = []
-        self.points: dict[int, PointVariable] = {}
+        self.points: dict[int, tuple[str, tuple[int, ...]]] = {}
         self.prefix, self.names = f"{program.name}/", NameColumn()
         self.first = first = body.first + 1
         shape = program.lines.shape[first : body.last]
@@ -105,7 +93,7 @@ class PlainMoves:
         loud = first + np.flatnonzero(self.variant < 0)
         self.ends: Ints = np.unique(np.concatenate([loud, joins, [body.last]]))
         said = self.statements
-        self.forms = [_form(one) if isinstance(one, ast.Move) else None for one in said]
+        self.forms = [*map(_form, said)]
         self.calls = [any(_calls(world, place, one)) for one in said]
         self.rows = world.initial.rows(self.prefix, self.names)
         self.name: Ints = self._name[own]
@@ -169,7 +157,7 @@ class PlainMoves:
         self.names.extend(goal)
         for k in np.flatnonzero((points & ~alone)[which]).tolist():
             key = self._world.root(place, goal[which[k]])
-            self.points[int(shapes[k])] = PointVariable(key, index)
+            self.points[int(shapes[k])] = key, index
         found: Bools = points[which]
         return found
 
@@ -219,62 +207,43 @@ class PlainMoves:
 def _may_be_plain(said: ir.SourceStatement) -> bool:
     if isinstance(said, ir.Instruction):
         return not isinstance(said, ast.ProgramCall)
-    return isinstance(said, ast.Move) and _is_plain(said)
+    return _form(said) is not None
 
 
-def _is_plain(move: ast.Move) -> bool:
-    """Tell whether a move goes to numbers or a variable; WITH may set numbers."""
-    if move.how != "TO" or move.trajectory not in ("JOINT", "LINEAR", ""):
-        return False
-    if move.arm or move.via or move.til is not None or move.sync:
-        return False
+def _form(move: ir.SourceStatement) -> MoveForm | None:
+    """Return what moves alike have in common, but for their trajectory.
+
+    None unless they go to numbers or a variable. WITH may set numbers.
+    """
+    if not isinstance(move, ast.Move) or move.how != "TO":
+        return None
+    other = move.arm or move.via or move.til is not None or move.sync
+    if other or move.trajectory not in ("JOINT", "LINEAR", ""):
+        return None
+    overrides = []
     for one in move.settings:
-        reference, value = one.target, one.value
-        plain = reference.name.startswith("$") and not reference.steps
-        if not (plain and isinstance(value, ir.Num)) or reference.name in _NOT_WITH:
-            return False
+        name, plain = one.target.name, not one.target.steps
+        plain = plain and name.startswith("$") and name not in _NOT_WITH
+        if not (plain and isinstance(one.value, ir.Num)):
+            return None
+        overrides.append((name.lstrip("$"), one.value.slot))
+    form = MoveForm(Motion.JOINT, fly=move.fly, overrides=tuple(overrides))
+    items: Sequence[ir.Operand | None] = ()
+    config = joints = None
     match move.where[0]:
-        case ir.FunctionCall("pos") as call:
-            *items, last = call.values
-            return _six_numbers(
-                items if isinstance(last, ir.StringLiteral) else call.values
-            )
-        case ir.Composite(items):
-            return _six_numbers(items)
         case ir.DataObject(name, () | (ir.ElementStep(_),)):
-            return not name.startswith("$")
-    return False
-
-
-def _form(move: ast.Move) -> MoveForm:
-    """Return what moves of a variant have in common, but for their trajectory."""
-    slots: tuple[int, ...] = ()
-    items: tuple[ir.Operand | None, ...] = ()
-    where = move.where[0]
-    if isinstance(where, ir.Composite):
-        items = where.items
-    elif isinstance(where, ir.FunctionCall):
-        items = where.values
-    if not isinstance(where, ir.DataObject):
-        slots = tuple(i.slot for i in items[:6] if isinstance(i, ir.Num))
-    config = items[6] if len(items) > 6 else None
-    return MoveForm(
-        Motion.JOINT,
-        fly=move.fly,
-        slots=slots,
-        joints=isinstance(where, ir.Composite),
-        config=config.text if isinstance(config, ir.StringLiteral) else None,
-        overrides=tuple(
-            (one.target.name.lstrip("$"), one.value.slot)
-            for one in move.settings
-            if isinstance(one.value, ir.Num)
-        ),
-    )
-
-
-def _six_numbers(items: object) -> bool:
-    assert isinstance(items, tuple | list)
-    return len(items) == 6 and all(isinstance(i, ir.Num) for i in items)
+            return None if name.startswith("$") else form
+        case ir.Composite(items):
+            joints = True
+        case ir.FunctionCall("pos") as call:
+            *items, config = (*call.values, None)
+            if items and isinstance(items[-1], ir.StringLiteral):
+                *items, config = items
+    slots = tuple(item.slot for item in items if isinstance(item, ir.Num))
+    if not len(slots) == len(items) == 6:
+        return None
+    written = config.text if isinstance(config, ir.StringLiteral) else None
+    return replace(form, slots=slots, joints=bool(joints), config=written)
 
 
 def _is_point(type_: ast.Type | None, array: bool) -> bool:
@@ -341,8 +310,11 @@ class MoveBlocks:
             calls = np.array(quiet.calls)[variant].any()
             if not calls and (run.point == WRITTEN).all():
                 self._written[first] = run
-        self._record(here, run)
-        here.row = end
+        # Moves to written numbers are the same ones again under the same settings:
+        # what differs is where the arm comes from.
+        here.row, come = run.at, self.machine.predecessors(here)
+        arrived = self.machine.record(here, 0, replace(run, origins=come))
+        here.store.last, here.row = frozenset({arrived}), end
         return True
 
     def _run_all(
@@ -395,17 +367,6 @@ class MoveBlocks:
                 forms[number] = replace(form, motion=motion, reason=reason)
         return forms
 
-    def _record(self, here: Execution, run: MoveBlock) -> None:
-        """Record moves and let the arm stand at the end of the last.
-
-        Moves to written numbers are the same ones again under the same settings: what
-        differs is where the arm comes from.
-        """
-        here.row = run.at
-        come = self.machine.predecessors(here)
-        run = replace(run, origins=come)
-        here.store.last = frozenset({self.machine.record(here, 0, run)})
-
 
 def _points(
     here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
@@ -426,7 +387,7 @@ def _points(
         if name >= 0:
             key = quiet.prefix + quiet.names[name]
         else:
-            key = _key(program.lines, quiet.points[shape], int(rows[at]))
+            key = _key(program.lines, int(rows[at]), *quiet.points[shape])
         value = here.store.get_assigned(key) if key else _NO_INDEX
         point[at] = initial.point(key) if value is None else HELD
         if point[at] < 0:
@@ -452,11 +413,10 @@ def _find_assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     return found
 
 
-def _key(lines: ProgramLines, point: PointVariable, row: int) -> str:
+def _key(lines: ProgramLines, row: int, key: str, slots: tuple[int, ...]) -> str:
     """Return where the point of a move is stored, "" where its index is not known."""
-    if not point.index:
-        return point.key
-    index = [float(lines.value[lines.first[row] + slot]) for slot in point.index]
+    index = [float(lines.value[lines.first[row] + slot]) for slot in slots]
     if not all(number.is_integer() for number in index):
         return ""
-    return f"{point.key}[{','.join(str(int(number)) for number in index)}]"
+    element = ",".join(str(int(number)) for number in index)
+    return f"{key}[{element}]" if slots else key

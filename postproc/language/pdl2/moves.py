@@ -238,17 +238,16 @@ def from_value(value: Value, system: bool = False) -> Pdl2Goal:
     slots, own = value.slots, value.complete and value.editable
     along = not own and target is Meaning.POSE and -1 not in slots
     axes = None if value.aux is None else tuple([axis for axis, _ in value.aux])
+    given = {axis: x for axis, x in value.aux or () if x is not None}
+    aux = NO_AXES
+    if given:
+        aux = tuple([given.get(axis, math.nan) for axis in range(1, MOST_AXES + 1)])
     return Pdl2Goal(
         target, numbers, slots if own else NO_SLOTS, slots if along else NO_SLOTS,
-        value.name, _read_aux(value) if value.aux else NO_AXES, reason,
+        value.name, aux, reason,
         shared=value.shared, config=value.config, axes=axes, taught=value.taught,
         holds=frozenset() if own or along else may_be(value),
     )  # fmt: skip
-
-
-def _read_aux(value: Position) -> tuple[float, ...]:
-    given = {axis: x for axis, x in value.aux or () if x is not None}
-    return tuple([given.get(axis, math.nan) for axis in range(1, MOST_AXES + 1)])
 
 
 NO_POSITION = Reason(Code.RUNTIME_VALUE, "the target is no position")

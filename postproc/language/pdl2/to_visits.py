@@ -246,15 +246,20 @@ class Pdl2Collector(Collector):
             if goal.follows[0] >= 0:
                 bases[visit] = goal.follows
         wanted = {-1, *pinned, *chain.from_iterable(bases.values())}
-        owner = _visits_of(np.array(sorted(wanted)[1:]), slots, literal)
+        numbers, owner = np.array(sorted(wanted)[1:]), dict[int, int]()
+        for some in chunks(len(slots) if len(numbers) else 0):
+            row, column = np.nonzero(isin_sorted(slots[some], numbers))
+            own = literal[some][row] >= 0
+            row, column = some.start + row[own], column[own]
+            owner |= zip(slots[row, column].tolist(), row.tolist(), strict=True)
         stay = {int(literal[owner[k]]): why for k, why in pinned.items() if k in owner}
         for visit, base in bases.items():
             at = owner.get(base[0], -1)
             if at >= 0 and (slots[at] == base).all():
                 follows[visit] = literal[at]
             else:
-                rows = [int(literal[owner[slot]]) for slot in base if slot in owner]
-                stay |= {row: _IN_PART for row in rows if row not in stay}
+                parts = [int(literal[owner[slot]]) for slot in base if slot in owner]
+                stay |= {part: _IN_PART for part in parts if part not in stay}
         return stay, follows
 
     def aux_problem(self, target: Pdl2Goal | Layout) -> Reason:
@@ -294,20 +299,3 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
     for kind in kinds:
         code, example = number_in_order(code * (int(kind.max(initial=0)) + 1) + kind)
     return code, example
-
-
-def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]:
-    """Return a visit by each of some numbers that belong to its literal.
-
-    Args:
-        wanted: The numbers, ascending, none below 0.
-        slots: Numbers of the targets, (n, 6).
-        literal: Literal of every visit, (n,), -1 where it has none.
-    """
-    found: dict[int, int] = {}
-    for rows in chunks(len(slots) if len(wanted) else 0):
-        at, column = np.nonzero(isin_sorted(slots[rows], wanted))
-        for k, slot in zip(at.tolist(), slots[rows][at, column].tolist(), strict=True):
-            if literal[rows.start + k] >= 0:
-                found[slot] = rows.start + k
-    return found

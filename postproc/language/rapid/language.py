@@ -8,7 +8,6 @@ from pathlib import Path
 
 from postproc.arrays import Floats
 from postproc.files import FolderListing
-from postproc.language import language
 from postproc.language.analysis.task_language import TaskLanguage
 from postproc.language.rapid import backup
 from postproc.language.rapid.clones import RapidCloner
@@ -62,9 +61,7 @@ class Rapid(TaskLanguage):
         own = backup.system_modules(program, listing)
         return (*own, *backup.modules_beside(program, listing))
 
-    def read_archive(self, folder: Path) -> language.Archive | None:
-        """Read ``MOC.cfg`` of a backup."""
-        return backup.read_backup(folder)
+    read_archive = staticmethod(backup.read_backup)
 
     def list_placed_arms(self, program: Path) -> tuple[tuple[str, Floats], ...]:
         """Return the arms of a backup, and where ``MOC.cfg`` places them."""

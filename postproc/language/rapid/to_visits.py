@@ -64,8 +64,13 @@ class RapidCollector(to_visits.TaskCollector):
                 pose = compose_poses(pose, pose_of_numbers(v.modes.shift))
             self.placed[key] = pose
         conditions = _conditions(v, self.base, self.placed[key])
+        given = [*sorted(v.modes.blocked), v.why, v.goal.why, v.tool.why]
+        if v.goal.target != Meaning.JOINTS:
+            given.append(v.wobj.why)
+            given.append(_SHIFT if v.modes.shift == UNKNOWN_SHIFT else NO_REASON)
+        given.append(_explain_unknown_load(v))
         flies = conditions.zone.blend != Blend.UNSET
-        return Arrival(conditions, _reasons(v), v.goal.target == Meaning.POSE, flies)
+        return Arrival(conditions, given, v.goal.target == Meaning.POSE, flies)
 
 
 def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
@@ -109,12 +114,3 @@ def _explain_unknown_load(v: RapidVisit) -> Reason:
         return _GRIP
     alone = v.modes.grip[0] and not v.tool.load
     return _PART_ALONE if alone else NO_REASON
-
-
-def _reasons(v: RapidVisit) -> tuple[Reason, ...]:
-    """Say why a visit cannot be compensated."""
-    given = (*sorted(v.modes.blocked), v.why, v.goal.why, v.tool.why)
-    if v.goal.target == Meaning.JOINTS:
-        return (*given, _explain_unknown_load(v))
-    shift = _SHIFT if v.modes.shift == UNKNOWN_SHIFT else NO_REASON
-    return (*given, v.wobj.why, shift, _explain_unknown_load(v))

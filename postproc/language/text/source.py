@@ -72,17 +72,13 @@ class Replacements(Sequence[Edit]):
     @classmethod
     def merge(cls, parts: Sequence[Replacements]) -> Replacements:
         """Put edits together whatever their order."""
-        if all(a.before(b) for a, b in pairwise(part for part in parts if len(part))):
+        if all(a.end[-1] <= b.start[0] for a, b in pairwise(filter(len, parts))):
             return cls.join(parts)
         start = np.concatenate([part.start for part in parts])
         end = np.concatenate([part.end for part in parts])
         new = np.concatenate([part.new for part in parts])
         order = np.argsort(start, kind="stable")
         return cls(start[order], end[order], new[order])
-
-    def before(self, other: Replacements) -> bool:
-        """Tell whether all of these end before the others begin."""
-        return bool(self.end[-1] <= other.start[0])
 
     @classmethod
     def of(cls, edits: Iterable[Edit]) -> Replacements:

@@ -36,12 +36,8 @@ class Word(str):
         return word
 
 
-class DeeperError(Exception):
-    """A statement holds more operators within each other than any program does."""
-
-
-class ReservedWordError(Exception):
-    """A word of the language stands where a name must."""
+class UnreadableError(Exception):
+    """Too many operators stand within each other, or a word where a name must."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +62,7 @@ class FormParser:
             return FAILED
         try:
             return self._build(line_parser(self.grammar, self.start).parse(form))
-        except (lark.exceptions.LarkError, DeeperError, ReservedWordError):
+        except (lark.exceptions.LarkError, UnreadableError):
             return FAILED
 
     @lru_cache(maxsize=16384)  # noqa: B019 - there is one for each grammar
@@ -91,13 +87,13 @@ class FormParser:
 
         def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
             if depth > DEEPEST:
-                raise DeeperError
+                raise UnreadableError
             if isinstance(node, lark.Token):
                 if node.type == "NUMBER":
                     return Num(next(slots))
                 text = str(node)
                 if node.type == "NAME" and text.lower() in self.reserved:
-                    raise ReservedWordError
+                    raise UnreadableError
                 if NAME_MARK in text:
                     text = text.replace(NAME_MARK, open_name(next(names)))
                 return Word(text, node.type)
