@@ -119,6 +119,7 @@ class Outline:
         """Close what the file leaves open."""
         self._close_until(0, len(self.text) - 1)
         self._find_flow(0, len(self.text))
+        self._blocks = FlowReader()  # the other one held this outline, and its text
 
     def _end(self, word: str, row: int) -> None:
         """End a scope, and what is left open within it."""
