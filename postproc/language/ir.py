@@ -45,6 +45,14 @@ def calls_in(*nodes: Node | None) -> list[FunctionCall]:
     return [part for part in walk(*nodes) if isinstance(part, FunctionCall)]
 
 
+def names_called(*nodes: Node | None) -> frozenset[str]:
+    """Return the names of the functions and instructions in nodes."""
+    calls = (
+        part for part in walk(*nodes) if isinstance(part, Instruction | FunctionCall)
+    )
+    return frozenset(one.name for one in calls)
+
+
 def data_in(*nodes: Node | None) -> list[DataObject]:
     """List the data that nodes name."""
     return [part for part in walk(*nodes) if isinstance(part, DataObject)]

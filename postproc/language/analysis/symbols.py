@@ -46,7 +46,6 @@ from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
 
 DEEPEST = 20  # names that stand for names
-_CALLS = ir.Instruction | ir.FunctionCall
 F = TypeVar("F", bound=TaskFile)
 
 
@@ -358,10 +357,8 @@ class TaskSymbols(ABC, Generic[F]):
         local = [one for one in self.every_routine if one.rows.head.local]
         if not local or self.calls_by_text:
             return frozenset()
-        found = set(self.odd_words)
-        for file in self.files:
-            parts = ir.walk(*file.text.said)
-            found |= {one.name for one in parts if isinstance(one, _CALLS)}
+        called = (ir.names_called(*file.text.said) for file in self.files)
+        found = self.odd_words.union(*called)
         return frozenset(
             one.key for one in local
             if one.rows.head.name not in found and one.rows.head.kind != "trap"
@@ -374,8 +371,7 @@ class TaskSymbols(ABC, Generic[F]):
         place = {one.rows.head.name: one.file for one in local}
         found = set[str]()
         for number, file in enumerate(self.files) if local else ():
-            parts = ir.walk(*file.text.said)
-            names = {one.name for one in parts if isinstance(one, _CALLS)} & {*place}
+            names = ir.names_called(*file.text.said) & {*place}
             several = len({one.module for one in self.routines_by_file[number]}) > 1
             found |= {name for name in names if several or place[name] != number}
         return frozenset(found)

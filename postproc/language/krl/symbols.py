@@ -273,7 +273,7 @@ class KrlTask(TaskSymbols[KrlFile]):
         for one in statements:
             uses.note(one)
         odd = file.text.words(file.text.where(holds_odd, rows.start, rows.stop))
-        called = odd.union(*map(list_calls, statements))
+        called = odd | ir.names_called(*statements)
         handed = {data.name for data in uses.targets}
         written = (handed | uses.written | uses.changed | odd).difference(own)
         return _Beside(frozenset(written), frozenset(uses.read.difference(own)), called)
@@ -364,12 +364,6 @@ class _Beside:
     written: frozenset[str]
     read: frozenset[str]
     called: frozenset[str]
-
-
-def list_calls(one: ir.SourceStatement) -> set[str]:
-    """Return the names of the routines that a statement calls, also later."""
-    calls = ir.Instruction | ir.FunctionCall
-    return {part.name for part in ir.walk(one) if isinstance(part, calls)}
 
 
 @dataclass

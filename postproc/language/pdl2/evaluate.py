@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import Context
-from postproc.language.analysis.values import WrittenNumber
+from postproc.language.analysis.values import FUNCTIONS, WrittenNumber, apply_function
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
 from postproc.language.pdl2.job import Place, World, base_variable
@@ -24,7 +24,6 @@ from postproc.language.pdl2.values import (
     Value,
     Vector,
     add_unknown,
-    function,
     invert_frame,
     operate,
     part_of,
@@ -314,11 +313,10 @@ class Execution:
                 return shift_position(p, by)
             case "pos_inv", [Position() as p]:
                 return invert_frame(p)
-            case (
-                ("abs" | "sqrt" | "sin" | "cos" | "tan" | "round" | "trunc"),
-                [float(x)],
-            ):
-                return function(name, x)
+            case _, [float(x)] if name in FUNCTIONS:
+                found = apply_function(name, x)
+                known = not math.isnan(found)
+                return found if known else Nothing("the root of a negative number")
         why = f"it comes from {name.upper()}, known only at run time"
         return add_unknown(Nothing(why), *values)
 

@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.found_goals import FoundGoal, FoundVisit
-from postproc.language.analysis.interpreter import Interpreter, calls_around
+from postproc.language.analysis.interpreter import Interpreter
 from postproc.language.analysis.origins import MANY, NOWHERE, TOLD_TOGETHER, Origins
 from postproc.language.pdl2.abstract_state import GivenValues, Store
 from postproc.language.pdl2.evaluate import Execution, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
-from postproc.language.pdl2.side_effects import circles, list_invoked
+from postproc.language.pdl2.side_effects import list_invoked
 from postproc.language.pdl2.values import Nothing
 from postproc.robot.trajectory import Motion
 
@@ -126,8 +125,6 @@ class MoveBlock(Pdl2Visit):
         return True
 
 
-DEEP = 64  # calls within calls, from where on it pays to know which call themselves
-
 Key = tuple[Context, int, int]
 
 
@@ -204,20 +201,15 @@ class Machine(Interpreter[Store]):
 
         Below a handler of a file without a main body there is none.
         """
-        if context.depth > DEEP and id(body) not in self._circles:
-            return []
         found: list[Body] = []
-        for one in calls_around(context):
-            if one.place is not None:
-                found.append(one.place.body)
-                if one.place.body is body:
+        inner: Context | None = None
+        while context is not inner and context.place is not None:
+            if not context.is_round:
+                found.append(context.place.body)
+                if context.place.body is body:
                     return found
+            inner, context = context, context.outer
         return []
-
-    @cached_property
-    def _circles(self) -> frozenset[int]:
-        """Bodies (by id) that call themselves, or come to one that does."""
-        return circles(self.world)
 
 
 OTHERS_WRITE = (

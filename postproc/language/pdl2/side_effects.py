@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from postproc.language import ir
-from postproc.language.analysis.call_graph import lead_to_recursion, reach
+from postproc.language.analysis.call_graph import reach
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES
 from postproc.language.pdl2.external_routines import (
@@ -279,16 +279,6 @@ def _list_called(world: World, place: Place, first: int, last: int) -> Iterator[
             found = world.find_routine(place.program, part.name)
         if found is not None:
             yield found
-
-
-def circles(world: World) -> frozenset[int]:
-    """Return the bodies (by id) that call themselves, or come to one that does."""
-    calls: dict[int, set[int]] = {}
-    for place in world.places():
-        body = place.body
-        called = _list_called(world, place, body.first, body.last)
-        calls[id(body)] = {id(one.body) for one in called}
-    return lead_to_recursion(calls)
 
 
 def has_target(statement: ir.SourceStatement) -> bool:

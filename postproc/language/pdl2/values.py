@@ -12,7 +12,6 @@ from postproc.diagnostics import Code
 from postproc.language.analysis.values import (
     COMPARISONS,
     WrittenNumber,
-    apply_function,
     apply_operator,
 )
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
@@ -245,7 +244,7 @@ def _derive_position(
     return Position(False, numbers, config=config, aux=aux, derived=why)
 
 
-# Operators and functions on values as far as they are known.
+# Operators on values as far as they are known.
 
 RUN_TIME = Nothing("it is known only at run time")
 
@@ -300,12 +299,6 @@ def operate(sign: str, *parts: Value) -> Value:
 
 def _number(sign: str, parts: Sequence[float | None]) -> float:
     return apply_operator(sign, [math.nan if one is None else one for one in parts])
-
-
-def function(name: str, x: float) -> Value:
-    """Return what a built-in function of one number gives (angles in degrees)."""
-    found = apply_function(name, x)
-    return Nothing("the root of a negative number") if math.isnan(found) else found
 
 
 @dataclass(frozen=True)

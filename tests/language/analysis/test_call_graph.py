@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from postproc.language.analysis.call_graph import lead_to_recursion, reach
+from postproc.language.analysis.call_graph import reach
 
 
 def drawn(seed: int) -> dict[int, set[int]]:
@@ -28,12 +28,3 @@ def test_each_routine_is_reached_once() -> None:
         found = [*reach([0], calls.__getitem__, int)]
         assert len(found) == len({*found})
         assert {*found} == {0} | closure(calls)[0]
-
-
-def test_those_that_call_themselves_and_those_that_come_to_one() -> None:
-    for seed in range(50):
-        calls = drawn(seed)
-        after = closure(calls)
-        circle = {one for one, to in after.items() if one in to}
-        before = {one for one, to in after.items() if to & circle}
-        assert lead_to_recursion(calls) == before
