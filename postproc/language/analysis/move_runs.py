@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Ints, chunks
+from postproc.arrays import Bools, Floats, chunks
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.text.statement_table import StatementText
 
@@ -78,14 +78,3 @@ def _alike(
 def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
     """Return the statements that stand on some lines."""
     return {row for line in lines for row in text.rows_on(line)}
-
-
-def within(counts: Ints) -> tuple[Indices, Indices]:
-    """Return of each of all that are counted: whose it is, and its place there.
-
-    >>> [column.tolist() for column in within(np.array([1, 3]))]
-    [[0, 1, 1, 1], [0, 0, 1, 2]]
-    """
-    owner = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
-    begin = (np.cumsum(counts) - counts).astype(np.int32)
-    return owner, np.arange(len(owner), dtype=np.int32) - begin[owner]

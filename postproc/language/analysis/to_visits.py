@@ -31,7 +31,6 @@ from postproc.language.analysis.found_goals import (
     array_of,
     whole_name,
 )
-from postproc.language.analysis.move_runs import within
 from postproc.language.analysis.origins import Origins, number_origins
 from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.analysis.visit_columns import (
@@ -140,7 +139,10 @@ class Collector(ABC):
         self.begin = np.cumsum(self.counts) - self.counts
         self.last = np.empty(len(order), np.int64)
         self.last[order] = self.begin + self.counts - 1
-        self.owner, self.inside = within(self.counts)
+        every = np.arange(len(order), dtype=np.int32)
+        self.owner: Indices = np.repeat(every, self.counts)
+        own = self.begin.astype(np.int32)[self.owner]
+        self.inside: Indices = np.arange(len(own), dtype=np.int32) - own
 
     # What a language says.
 

@@ -8,7 +8,7 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.language.analysis import move_runs
-from postproc.language.analysis.move_runs import rows_of_lines, within
+from postproc.language.analysis.move_runs import rows_of_lines
 from postproc.language.analysis.visit_columns import chain_visits
 from postproc.language.rapid.program import read_statements
 from postproc.language.text.source import Source
@@ -180,9 +180,3 @@ def test_lines_are_found_by_the_statements_that_stand_on_them():
     rows = rows_of_lines(text, {3})
     assert [text.quote(row) for row in rows] == ["'VAR num x :=1;'"]
     assert rows_of_lines(text, set()) == set()
-
-
-def test_counts_say_whose_a_move_is():
-    owner, inside = within(np.array([2, 1, 3]))
-    assert owner.tolist() == [0, 0, 1, 2, 2, 2]
-    assert inside.tolist() == [0, 1, 0, 0, 1, 2]
