@@ -290,7 +290,7 @@ def _verify(
     Raises:
         VerificationError: The output is not what was meant.
     """
-    again = read_program(output.files, setting.cell)
+    again = read_program(output.files, setting.cell, reading.parsed)
     release_memory(len(reading.visits))
     check_output(reading, again, output, kept.edited, kept.decisions.corrected)
     return again

@@ -23,7 +23,12 @@ from postproc.compensation.targets import targets_from_visits, with_tracks
 from postproc.language.language import Start
 from postproc.language.languages import language_of
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import Edit, Source, source_from_bytes
+from postproc.language.text.source import (
+    Edit,
+    ParsedFiles,
+    Source,
+    source_from_bytes,
+)
 from postproc.language.visits import Diagnostic, Visits
 from postproc.model.backlash_width import play_of_model
 from postproc.model.model import Model
@@ -51,6 +56,7 @@ class ParsedProgram:
         missed: Lines of moves that are never reached, by file.
         untouched: Names of files that are read, and never rewritten.
         begins: The first visit of every program.
+        parsed: What was parsed of files that hold no target to correct.
         aims: Sides of the joints that visits are meant to be reached from, (n, 6),
             where the search for them is to begin; NaN: as planned, as all where empty.
     """
@@ -61,6 +67,7 @@ class ParsedProgram:
     cloned: tuple[tuple[Edit, ...], ...] = ()
     given: tuple[Source, ...] = ()
     begins: tuple[int, ...] = (0,)
+    parsed: ParsedFiles = field(default_factory=dict)
     missed: Mapping[str, Ints] = field(default_factory=dict)
     aims: Floats = field(default_factory=lambda: np.empty((0, 6)))
     untouched: frozenset[str] = frozenset()
@@ -170,26 +177,33 @@ def assuming(cell: Cell, options: Options) -> Cell:
     return replace(cell, compensation=own)
 
 
-def read_program(files: Mapping[str, bytes], cell: Cell) -> ParsedProgram:
+def read_program(
+    files: Mapping[str, bytes], cell: Cell, known: ParsedFiles | None = None
+) -> ParsedProgram:
     """Parse a program and resolve its visits.
 
     Args:
         files: Bytes by name: first the program itself, then the programs that it
             imports, last, where there is one, its variable file.
         cell: What holds at program start.
+        known: Files that were parsed before, see `Language.read`.
 
     Raises:
         ProgramError: A file is no program text, or the program is another arm's.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
     language = language_of(sources[0].name)
-    found = language.read(sources, start_of(cell))
+    parsed = {} if known is None else dict(known)
+    found = language.read(sources, start_of(cell), parsed)
+    for file in np.unique(found.visits.literals.file).tolist():
+        parsed.pop(found.visits.files[file])  # it is about to change
     return ParsedProgram(
         found.texts,
         with_tracks(found.visits, cell),
         found.diagnostics,
         missed=found.missed,
         untouched=found.untouched,
+        parsed=parsed,
     )
 
 

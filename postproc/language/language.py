@@ -23,7 +23,7 @@ from postproc.language.text.comment_directives import (
     insertion_mark,
 )
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import Edit, Source, Span, check_length
+from postproc.language.text.source import Edit, ParsedFiles, Source, Span, check_length
 from postproc.language.visits import Diagnostic, Literals, Visits
 
 Record = tuple[float, ...] | None
@@ -257,12 +257,19 @@ class Language(ABC):
         """Tell whether a text without a name begins as programs of this language do."""
 
     @abstractmethod
-    def read(self, sources: Sequence[Source], start: Start) -> JobReading:
+    def read(
+        self,
+        sources: Sequence[Source],
+        start: Start,
+        known: ParsedFiles | None = None,
+    ) -> JobReading:
         """Parse the files of a job and resolve its visits.
 
         Args:
             sources: First the program itself, then those that belong to it.
             start: What the cell says.
+            known: Files that were parsed before, and are not parsed again as long as
+                they are the same; these become known.
 
         Raises:
             ProgramError: A file is no program text, or the program is another arm's.

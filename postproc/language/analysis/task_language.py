@@ -17,7 +17,7 @@ from postproc.language.language import Cloner, JobReading, Language, Start
 from postproc.language.text.blocks import check_blocks
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import Source
+from postproc.language.text.source import ParsedFiles, Source, parse_once
 from postproc.language.visits import never_reached
 
 
@@ -90,26 +90,37 @@ class TaskLanguage(Language):
         """Load the parser of statements."""
         line_parser(self.grammar, "statement")
 
-    def parse(self, sources: Sequence[Source], start: Start) -> TaskSymbols[Any]:
+    def parse(
+        self,
+        sources: Sequence[Source],
+        start: Start,
+        known: ParsedFiles | None = None,
+    ) -> TaskSymbols[Any]:
         """Parse the files of a job, see `Language.read`.
 
         Raises:
             ProgramError: A file of the task is none, or the first holds no routine.
         """
-        own = [one for one in sources if not self.is_beside(one)]
-        others = [one for one in sources if self.is_beside(one)]
-        files = [self.read_file(one) for one in own]
+        parsed = [parse_once(known, one, self.read_file) for one in sources]
+        beside = [self.is_beside(one) for one in sources]
+        files = [one for one, is_ in zip(parsed, beside, strict=True) if not is_]
         for file in files:
             check_blocks(file)
         if not files[0].routines:
             problem = "the file holds no routine"
-            raise ProgramError(own[0].name, problem, self.cure)
+            raise ProgramError(files[0].text.source.name, problem, self.cure)
         self.refuse(files)
-        return self.task(files, start, [self.read_file(one) for one in others])
+        others = [one for one, is_ in zip(parsed, beside, strict=True) if is_]
+        return self.task(files, start, others)
 
-    def read(self, sources: Sequence[Source], start: Start) -> JobReading:
+    def read(
+        self,
+        sources: Sequence[Source],
+        start: Start,
+        known: ParsedFiles | None = None,
+    ) -> JobReading:
         """Read the files of a job and follow it, see `Language.read`."""
-        task = self.parse(sources, start)
+        task = self.parse(sources, start, known)
         machine = follow(self.machine, task)
         collector = self.collector(machine)
         visits = collector.collect()

@@ -19,7 +19,7 @@ from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import Source
+from postproc.language.text.source import ParsedFiles, Source, parse_once
 from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
@@ -45,9 +45,14 @@ class Pdl2(Language):
         """Tell that a text may be PDL2: what begins as nothing else is taken for it."""
         return True
 
-    def read(self, sources: Sequence[Source], start: Start) -> JobReading:
+    def read(
+        self,
+        sources: Sequence[Source],
+        start: Start,
+        known: ParsedFiles | None = None,
+    ) -> JobReading:
         """Parse a program, its pages and its variable file; see `Language.read`."""
-        program = parse(sources[0])
+        program = parse_once(known, sources[0], parse)
         if program.main is None and not program.routines:
             problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
             raise ProgramError(sources[0].name, problem, cure)
@@ -57,10 +62,10 @@ class Pdl2(Language):
         texts = [Skeleton.of(program.lines)]
         for source in sources[1:]:
             if Pdl2FileName(source.name).is_variables:
-                variables = read_variables(source)
+                variables = parse_once(known, source, read_variables)
                 texts.append(Skeleton.of(variables.lines))
             else:
-                page = parse(source)
+                page = parse_once(known, source, parse)
                 # Where its PROGRAM line is not understood, its file names it.
                 pages.append(page if page.name else replace(page, name=_file(page)))
                 texts.append(Skeleton.of(pages[-1].lines))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from postproc.arrays import Bytes, Indices, Ints, chunks
 from postproc.exceptions import PostprocError, ProgramError
 
 AT_ONCE = 50_000  # edits that are Python objects at the same time
+T = TypeVar("T")
 LAST = 2**31 - 1  # offset in a file; none that is read is as long
 
 
@@ -259,6 +260,22 @@ class Source:
         start = int(self.line_starts[line - 1])
         end = _LINE_END.search(self.data, start)
         return self.text[start : end.start() if end else len(self.data)]
+
+
+ParsedFiles = dict[str, tuple[Source, Any]]
+"""Files by name as they were read, and what was parsed of them."""
+
+
+def parse_once(
+    known: ParsedFiles | None, source: Source, parse: Callable[[Source], T]
+) -> T:
+    """Parse a file, unless it is known as it is; it is then."""
+    if known is None:
+        return parse(source)
+    if source.name not in known or known[source.name][0] != source:
+        known[source.name] = source, parse(source)
+    found: T = known[source.name][1]
+    return found
 
 
 def source_from_bytes(name: str, data: bytes) -> Source:
