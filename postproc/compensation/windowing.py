@@ -161,7 +161,6 @@ def _literals(programs: Sequence[Visits]) -> Literals:
 # the same at the targets beside a cut, round by round (see `parallel`).
 
 LEAST = 20_000  # visits of a window; shorter programs are one
-MANY = 50_000  # .. of one of many: halos, and the way through the code, cost a tenth
 HALO = 400  # visits on either side; a round reaches some 20, and LONG ones are long
 BAND = 32  # visits on either side of a cut that both must agree on
 RUN_UP = 2_000  # visits that tell how the arm comes to a window
@@ -250,9 +249,9 @@ def share(n: int, processes: int) -> int:
     """Return the visits of a window of n: every process gets as many windows.
 
     >>> [share(n, 2) for n in (40_000, 100_000, 1_000_000)]
-    [20000, 50000, 50000]
+    [20000, 25000, 20000]
     """
-    count = max(n // MANY, min(n // LEAST, processes))
+    count = n // LEAST
     return n // max(count - count % processes, 1)
 
 

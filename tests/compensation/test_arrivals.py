@@ -88,7 +88,6 @@ def test_windows_hand_on_how_the_arm_arrives(bench_cell, bench_model, monkeypatc
     job = made.drilling(400)
     whole = compensate(job.source, bench_cell, bench_model)
     monkeypatch.setattr(cuts, "LEAST", 60)
-    monkeypatch.setattr(cuts, "MANY", 60)
     parts = compensate(job.source, bench_cell, bench_model)
     a, b = whole.arrivals, parts.arrivals
     assert len(a.travel) == len(a.speed) == len(whole.visits)

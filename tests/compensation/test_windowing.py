@@ -33,8 +33,7 @@ FAR = "9000.0000, 0.0000, 0.0000, 0.0000, 180.0000, 0.0000"
 @pytest.fixture
 def job(bench_cell, bench_model, monkeypatch):
     def run(program: made.Made, least: int = LEAST, processes: int = 1) -> Outcome:
-        for name in ("LEAST", "MANY"):
-            monkeypatch.setattr(cuts, name, least)
+        monkeypatch.setattr(cuts, "LEAST", least)
         return compensate(
             program.source,
             bench_cell,
