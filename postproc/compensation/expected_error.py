@@ -159,7 +159,7 @@ class ErrorLaws:
         Args:
             found: The predicted errors.
             spread: How held-out readings scatter against their noise, see
-                `Model.reading_spread`; below 1 it is taken as 1.
+                `Model.reading_spread`; below 1 it counts as 1.
             correction: Change of their commanded TCP, base frame, (n, 3) [m]; zero
                 where nothing was corrected.
             judged: Whether visits have a target that they can miss, (n,).

@@ -146,7 +146,7 @@ def correct_batch(
 def _split(
     kept: WindowResult, readings: Sequence[ParsedProgram]
 ) -> Iterator[WindowResult]:
-    """Give every program what is told of its visits."""
+    """Yield the result of every program."""
     visits = offsets([len(reading.visits) for reading in readings])
     literals = offsets([len(reading.visits.literals) for reading in readings])
     files = offsets([len(reading.texts) for reading in readings])

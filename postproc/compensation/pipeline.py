@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,9 @@ from postproc.compensation.rewrite import (
 from postproc.compensation.taught_frames import correct_taught
 from postproc.compensation.window_result import (
     WindowResult,
+    complete_room,
     correction_of,
     example_of,
-    finish,
     in_shared_memory,
     room_like,
 )
@@ -55,9 +55,6 @@ from postproc.language.visits import Graph
 from postproc.motion.joint_path import StartState
 from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.trajectory import Motion
-
-if TYPE_CHECKING:
-    pass
 
 # A program corrected window by window, so that only one is in memory at a time.
 
@@ -132,7 +129,7 @@ def _in_windows(reading: ParsedProgram, setting: Job) -> WindowResult:
         try:
             found = in_processes(work, cut, setting.clock, setting.processes)
             ends = [0, *(part.window.end for part in found)]
-            return finish(room, [part.kept for part in found], ends)
+            return complete_room(room, [part.kept for part in found], ends)
         except NotAloneError:
             pass
     return _whole(reading, setting)[0]

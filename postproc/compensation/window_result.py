@@ -42,7 +42,7 @@ T = TypeVar("T", bound="WindowResult | Decisions | ErrorLaws | LengthLaw")
 Make = Callable[[tuple[int, ...], np.dtype[Any]], NDArray[Any]]
 ALL = slice(None)
 AS_A_WHOLE = ("edited", "edits", "departure", "reasons")
-"""What is not told of every visit by itself."""
+"""Fields that hold no row for each visit."""
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,13 @@ class WindowResult:
     departure: Floats
 
     def take(self, rows: slice | Ints) -> WindowResult:
-        """Return what is told of some visits, in any order, with all edits."""
+        """Return the columns of some visits, in any order, with all edits."""
         by_visit = len(self.departure) == len(self.corrected)
         departure = self.departure[rows] if by_visit else self.departure
         return replace(map_columns(self, lambda c: c[rows]), departure=departure)
 
     def of_window(self, visits: Visits, own: slice) -> WindowResult:
-        """Return what is told of a window as a whole, and of none of its visits.
+        """Return the fields of a window as a whole, without rows of its visits.
 
         Args:
             visits: Those that were worked through.
@@ -171,13 +171,11 @@ def room_like(example: WindowResult, n: int, make: Make = np.empty) -> WindowRes
 def in_shared_memory(shape: tuple[int, ...], kind: np.dtype[Any]) -> NDArray[Any]:
     """Make an array that processes forked from this one can fill."""
     size = int(np.prod(shape)) * kind.itemsize
-    return np.frombuffer(mmap(-1, max(size, 1)), kind, size // kind.itemsize).reshape(
-        shape
-    )
+    return np.ndarray(shape, kind, mmap(-1, max(size, 1)))
 
 
 def example_of(width: int, turned: bool) -> WindowResult:
-    """Return what is told of one visit, without values.
+    """Return a row of all columns, without values.
 
     Args:
         width: Numbers of a target.
@@ -207,13 +205,13 @@ def join_windows(parts: Sequence[WindowResult]) -> WindowResult:
     whole = room_like(parts[0], ends[-1])
     for rows, part in zip(map(slice, ends, ends[1:]), parts, strict=False):
         whole.put(rows, part)
-    return finish(whole, parts, ends)
+    return complete_room(whole, parts, ends)
 
 
-def finish(
+def complete_room(
     whole: WindowResult, parts: Sequence[WindowResult], ends: Sequence[int]
 ) -> WindowResult:
-    """Complete a program whose visits are entered by what is told of its windows.
+    """Add the fields of windows to a program whose visits have been entered.
 
     Args:
         whole: The visits; the reasons of each window have numbers of its own.
@@ -303,9 +301,9 @@ def _errors_planned(
     Most are foreseen: a target is corrected for the sides that were planned, but where
     the correction changes them.
     """
-    anew = np.array(moved)
+    other = np.array(moved)
     if not model.evaluator(cell.arm).given:  # which may depend on the visit before
-        anew &= any_in_rows(states.direction != decided.side)
+        other &= any_in_rows(states.direction != decided.side)
     out = np.array(foreseen.error)
-    out[anew] = model.error(cell.arm, states[anew])
+    out[other] = model.error(cell.arm, states[other])
     return out[moved]

@@ -53,13 +53,13 @@ def job(bench_cell, bench_model, monkeypatch):
 def joined(monkeypatch) -> list[int]:
     """Collect how many windows every program was put together from."""
     found: list[int] = []
-    original = pipeline.finish
+    original = pipeline.complete_room
 
     def watched(whole, parts, ends):
         found.append(len(parts))
         return original(whole, parts, ends)
 
-    monkeypatch.setattr(pipeline, "finish", watched)
+    monkeypatch.setattr(pipeline, "complete_room", watched)
     return found
 
 

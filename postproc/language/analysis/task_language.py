@@ -101,17 +101,17 @@ class TaskLanguage(Language):
         Raises:
             ProgramError: A file of the task is none, or the first holds no routine.
         """
-        parsed = [parse_once(known, one, self.read_file) for one in sources]
-        beside = [self.is_beside(one) for one in sources]
-        files = [one for one, is_ in zip(parsed, beside, strict=True) if not is_]
+        own = [one for one in sources if not self.is_beside(one)]
+        others = [one for one in sources if self.is_beside(one)]
+        files = [parse_once(known, one, self.read_file) for one in own]
         for file in files:
             check_blocks(file)
         if not files[0].routines:
             problem = "the file holds no routine"
-            raise ProgramError(files[0].text.source.name, problem, self.cure)
+            raise ProgramError(own[0].name, problem, self.cure)
         self.refuse(files)
-        others = [one for one, is_ in zip(parsed, beside, strict=True) if is_]
-        return self.task(files, start, others)
+        beside = [parse_once(known, one, self.read_file) for one in others]
+        return self.task(files, start, beside)
 
     def read(
         self,

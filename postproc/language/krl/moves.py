@@ -376,9 +376,9 @@ class KrlGoal(goals.GoalReader):
         frame = FrameReader(self.task, self.here, _NO, _NO).frame(other)
         if base.target != Meaning.POSE or not frame.pose:
             return self.apply_shift(base, goals.ReadShift(own=own, shifts=shifts))
-        told = [n.value for n in numbers] if numbers else six_numbers(frame)
+        six = [n.value for n in numbers] if numbers else six_numbers(frame)
         kind = ShiftKind.OWN if behind else ShiftKind.FRAME
-        by = Shift(kind, tuple(told), base.values, flagged=not behind)
+        by = Shift(kind, tuple(six), base.values, flagged=not behind)
         # Numbers of data may serve other moves and sums too: they stay.
         alone = isinstance(other, said.KrlAggregate) and numbers is not None
         alone = alone and {file_of(one.slot) for one in numbers or ()} == {here}

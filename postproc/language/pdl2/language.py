@@ -72,8 +72,8 @@ class Pdl2(Language):
         others = _by_name(program, pages)
         release_memory(sum(len(text.numbers) for text in texts))
         found = resolve(program, start, variables, others)
-        told = never_reached(found.missed, "the start", "program")
-        every = (*found.diagnostics, *told)
+        unreached = never_reached(found.missed, "the start", "program")
+        every = (*found.diagnostics, *unreached)
         return replace(found, texts=tuple(texts), diagnostics=every)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:

@@ -21,7 +21,7 @@ from postproc.language.pdl2.side_effects import list_invoked
 from postproc.language.pdl2.values import Nothing
 from postproc.robot.trajectory import Motion
 
-MOST_AXES = 12  # auxiliary axes that are told
+MOST_AXES = 12  # auxiliary axes at the most
 UNKNOWN = (math.nan,) * 6
 NO_AXES = (math.nan,) * MOST_AXES
 NO_SLOTS = (-1,) * 6

@@ -53,7 +53,7 @@ class Pdl2Collector(Collector):
     found: list[Pdl2Visit]
 
     def __init__(self, machine: Machine) -> None:
-        """Make room for what blocks are told by."""
+        """Make room for the fields of blocks."""
         self.world = machine.world
         super().__init__(machine, self.world.numbering)
         self.settings, self.forms = SettingTable(), Interned[MoveForm]()
