@@ -328,11 +328,12 @@ class Collector(ABC):
                 if at < len(rows):
                     ids[-1].setdefault(int(rows[at]), mark)
         found = dict[int, str]()
-        for v, begin in zip(self.found if any(ids) else (), self.begin, strict=False):
+        begins = self.begin.tolist()
+        for v, begin in zip(self.found if any(ids) else (), begins, strict=False):
             own = {} if v.via else ids[v.scope.file]
-            rows = np.arange(len(self.numbering.texts[v.scope.file]))[v.rows]
-            for k in np.flatnonzero(np.isin(rows, [*own])).tolist():
-                found[int(begin) + k] = own[int(rows[k])]
+            rows = v.rows
+            each = range(rows.start, rows.stop) if isinstance(rows, slice) else rows
+            found |= {begin + k: own[row] for k, row in enumerate(each) if row in own}
         return found
 
 
