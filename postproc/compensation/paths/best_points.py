@@ -11,6 +11,7 @@ import numpy as np
 from postproc.compensation.paths.arcs import Cut, halves
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
+from postproc.compensation.paths.plan_outcomes import Rows
 
 BETTER = 1e-6  # [m] less is no matter
 IN_VAIN = 5  # rounds of more points that make a move no better: it gets no more
@@ -21,13 +22,13 @@ class _Tried:
     """What was put on the way of a move.
 
     Attributes:
-        size: How far the move left its path with it [m]; of an arc, of both halves.
+        score: How far the move left its path with it, see `_score` [m].
         points: The points by visit; of an arc, of both its halves.
         stops: Those of these visits whose first point is a stop.
         chords: Which of its pieces are chords.
     """
 
-    size: float
+    score: float
     points: Mapping[int, tuple[float, ...]]
     stops: frozenset[int]
     chords: frozenset[Cut]
@@ -61,12 +62,11 @@ class BestPoints:
         for v, tried in _list_tried(now).items():
             known = best.setdefault(v, tried)
             rounds, most = vain.get(v, (0, 0))
-            helps = tried.size < known.size - BETTER
+            helps = tried.score < known.score - BETTER
             more = tried.count > most
             vain[v] = 0 if helps else rounds + more, max(most, tried.count)
-            if v not in bad and tried.size <= known.size + BETTER:  # the later one
-                farther = tried.size > known.size
-                best[v] = replace(tried, size=known.size) if farther else tried
+            if v not in bad and tried.score <= known.score + BETTER:  # the later one
+                best[v] = replace(tried, score=min(tried.score, known.score))
         return BestPoints(best, {**now.refusals, **self.refused}, vain)
 
     def settle(self, now: PathPrediction) -> PathPrediction:
@@ -80,7 +80,7 @@ class BestPoints:
         plan, bad = now.plan, _unfit(now)
         for v, has in _list_tried(now).items():
             best = self.best[v]
-            if v in bad or has.size > best.size + BETTER:
+            if v in bad or has.score > best.score + BETTER:
                 others = {k: s for k, s in plan.points.items() if k not in has.points}
                 plan = replace(
                     plan,
@@ -99,15 +99,30 @@ def _unfit(now: PathPrediction) -> set[int]:
     return {halves(now.task.visits, v)[0] for v in rows}
 
 
+def _score(now: PathPrediction, own: Rows) -> float:
+    """Say how far a move leaves its path, inf where it is harmed or not predicted [m].
+
+    See `MoveDeviation`; of an arc it is that of both halves.
+    """
+    task, scores = now.task, list[float]()
+    for v in own:
+        one = now.deviations.get(v)
+        if one is None or one.is_harmed(task.deviations.get(v, one), task.tolerance):
+            return np.inf
+        scores.append(one.both)
+    return hypot(*scores)
+
+
 def _list_tried(now: PathPrediction) -> dict[int, _Tried]:
     """Say what the moves have now, by their first visits, and how they do."""
-    plan, sizes, found = now.plan, now.sizes, dict[int, _Tried]()
+    plan, found = now.plan, dict[int, _Tried]()
     chords = dict[int, list[Cut]]()
     for cut in plan.chords:
         chords.setdefault(cut[0], []).append(cut)
     for own in {halves(now.task.visits, v) for v in plan.open}:
-        size = hypot(*[sizes.get(row, np.inf) for row in own])
         points = {row: plan.points[row] for row in own if row in plan.points}
         cuts = frozenset(cut for row in own for cut in chords.get(row, ()))
-        found[own[0]] = _Tried(size, points, plan.stops.intersection(own), cuts)
+        found[own[0]] = _Tried(
+            _score(now, own), points, plan.stops.intersection(own), cuts
+        )
     return found

@@ -28,7 +28,11 @@ from postproc.compensation.paths.gathered import Gathered
 from postproc.compensation.paths.insertion_plan import InsertionPlan, Written
 from postproc.compensation.paths.meant_sides import PlanSides
 from postproc.compensation.paths.moved_corners import SourceCorners
-from postproc.compensation.paths.path_error import PathAccuracy, gather_paths
+from postproc.compensation.paths.path_error import (
+    PathAccuracy,
+    deviations_of,
+    gather_paths,
+)
 from postproc.compensation.paths.plan_outcomes import (
     MoveOutcomes,
     Predicted,
@@ -36,7 +40,7 @@ from postproc.compensation.paths.plan_outcomes import (
     compare,
     expect_better,
 )
-from postproc.compensation.paths.plan_rule import NEGLIGIBLE
+from postproc.compensation.paths.plan_rule import NEGLIGIBLE, MoveDeviation
 from postproc.compensation.paths.split_constraints import (
     hindrances,
     speeds_of_pieces,
@@ -169,6 +173,12 @@ class InsertionTask:
         file, line = int(self.visits.place.file[v]), int(self.lines[v])
         found = self._hindrances.get(v)
         return found or unwritable(self.splitter, self.visits, v, file, line)
+
+    @cached_property
+    def deviations(self) -> dict[int, MoveDeviation]:
+        """Return how far each move leaves its path without points, by visit."""
+        paths = self.first.paths
+        return deviations_of(paths, np.arange(len(paths)))
 
     @property
     def tolerance(self) -> float:
@@ -502,15 +512,18 @@ class PathPrediction:
         return float(paths.way[paths.samples(k)][-1])
 
     @cached_property
+    def deviations(self) -> dict[int, MoveDeviation]:
+        """Return how far each move leaves its path, by visit."""
+        found: dict[int, MoveDeviation] = {}
+        for k, part in enumerate(self.parts):
+            mine = np.flatnonzero(self.part[part.paths.visit] == k)
+            found.update(deviations_of(part.paths, mine))
+        return dict(sorted(found.items()))
+
+    @cached_property
     def sizes(self) -> dict[int, float]:
         """Return how far each move leaves its path at the most [m], by visit."""
-        found: dict[int, float] = {}
-        for k, part in enumerate(self.parts):
-            paths = part.paths
-            mine = np.flatnonzero(self.part[paths.visit] == k)
-            sizes = paths.after.sizes[mine].tolist()
-            found.update(zip(paths.visit[mine].tolist(), sizes, strict=True))
-        return dict(sorted(found.items()))
+        return {v: one.largest for v, one in self.deviations.items()}
 
     @property
     def room(self) -> int:

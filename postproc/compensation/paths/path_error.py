@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import starmap
 from typing import Any
 
 import numpy as np
 
+from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
 from postproc.compensation.paths.flank_cases import UNSURE, FlankCases
@@ -26,6 +28,7 @@ from postproc.compensation.paths.path_states import (
     ErrorAlong,
     refine_at_reversals,
 )
+from postproc.compensation.paths.plan_rule import ALONG, MoveDeviation
 from postproc.model.model import Model
 from postproc.motion.cycle_time import ProgramCycle
 from postproc.robot.cell import Cell
@@ -228,6 +231,33 @@ def _gather_columns(
 def sizes_of(paths: PathAccuracy) -> dict[int, float]:
     """How far each move of the compensated program leaves its path at the most [m]."""
     return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
+
+
+def deviations_of(paths: PathAccuracy, moves: Ints) -> dict[int, MoveDeviation]:
+    """Say how far some moves of the compensated program leave their paths, by visit.
+
+    Args:
+        paths: The moves.
+        moves: Which of them, (k,).
+    """
+    step = steps_of(paths.way, paths.first)
+    within = _native.stays_within(ALONG, paths.after.across, step, paths.first, moves)
+    pairs = zip(within.tolist(), paths.after.sizes[moves].tolist(), strict=True)
+    return dict(
+        zip(paths.visit[moves].tolist(), starmap(MoveDeviation, pairs), strict=True)
+    )
+
+
+def steps_of(way: Floats, first: Ints) -> Floats:
+    """Return the way from the sample before to each, (s,) [m].
+
+    Args:
+        way: Path length at the samples since their path began, (s,) [m].
+        first: Where the samples of each path begin, and the last ones end, (m + 1,).
+    """
+    step = np.diff(way, prepend=0.0)
+    step[first[:-1]] = 0.0
+    return step
 
 
 def predict_paths(

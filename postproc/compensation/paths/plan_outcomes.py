@@ -17,8 +17,10 @@ from postproc.compensation.paths.path_error import (
     PathAccuracy,
     apart,
     largest_in,
+    steps_of,
 )
 from postproc.compensation.paths.plan_rule import (
+    ALONG,
     NEGLIGIBLE,
     PlanOutcome,
     choose_plan,
@@ -30,7 +32,6 @@ from postproc.model.flank_hypotheses import OPEN, FlankKind
 from postproc.model.variance import covariance_times
 from postproc.robot.pose import MM, lengths
 
-ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 BEGINS = 5e-3  # [m] in which drives cross their gaps, where a move begins
 ALMOST = 2e-6  # [m] to which what is expected of a plan holds
 LAST = 1.0 - 1e-9  # share of a way that is still on it
@@ -565,6 +566,4 @@ class _PlannedMoves:
     @cached_property
     def _step(self) -> Floats:
         """Way from the sample before to each, (s,) [m]."""
-        step = np.diff(self.way, prepend=0.0)
-        step[self.first[:-1]] = 0.0
-        return step
+        return steps_of(self.way, self.first)

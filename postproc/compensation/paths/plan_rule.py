@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +16,36 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.model.flank_hypotheses import OPEN
 from postproc.robot.pose import MM
 
+ALONG = 0.95  # of a way: what the deviation of a plan is taken of
 LEAST_STEP = 0.05 * MM  # [m] the finest promise, and harm that counts at the least
 PREDICTED = 0.01 * MM  # [m] what a deviation is predicted to: harm may be so much more
 NEGLIGIBLE = 0.2  # of the tolerance: steps that together never count against a plan
+
+
+class MoveDeviation(NamedTuple):
+    """How far a move leaves its path, as predicted.
+
+    Attributes:
+        within: What 95 % of its way stays within [m].
+        largest: At the most [m].
+    """
+
+    within: float
+    largest: float
+
+    @property
+    def both(self) -> float:
+        """Return the sum, by which plans of a move are compared: both are promised."""
+        return self.within + self.largest
+
+    def is_harmed(self, before: MoveDeviation, tolerance: float) -> bool:
+        """Return True if it is farther at the most by more than may be.
+
+        Args:
+            before: The move without points.
+            tolerance: Of paths [m].
+        """
+        return self.largest > before.largest + tolerable_harm(tolerance)
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,13 @@ from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.backlash_preload import LATEST, TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
-from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import (
     BEGINS,
     MoveOutcomes,
     Objection,
     Rows,
 )
-from postproc.compensation.paths.plan_rule import resolution
+from postproc.compensation.paths.plan_rule import MoveDeviation, resolution
 from postproc.compensation.paths.reapproach import WORSE, bad_approaches
 from postproc.compensation.paths.rounded_points import measure_rounded
 from postproc.language.visits import Visits
@@ -32,7 +31,7 @@ def judge(now: PathPrediction) -> PathPrediction:
     """Take back points that make moves no better for certain."""
     task = now.task
     now = task.predict(choose_plans(now))
-    without = _of_moves(now, sizes_of(task.first.paths))
+    without = _of_moves(now, task.deviations)
     for k in range(JUDGED):
         now, bad, anew = _find_bad(now, without)
         if not bad and not anew:
@@ -50,7 +49,7 @@ def judge(now: PathPrediction) -> PathPrediction:
 
 
 def _find_bad(
-    now: PathPrediction, without: dict[int, float]
+    now: PathPrediction, without: dict[int, MoveDeviation]
 ) -> tuple[PathPrediction, dict[int, Removal], set[int]]:
     """Find what must go; where nothing must, write the program.
 
@@ -202,7 +201,7 @@ class Removal(NamedTuple):
 
 
 def _bad(
-    now: PathPrediction, without: dict[int, float]
+    now: PathPrediction, without: dict[int, MoveDeviation]
 ) -> Iterator[tuple[int, Removal]]:
     """Yield the moves with points that must go, and why."""
     plan = now.plan
@@ -229,7 +228,7 @@ class _Judged:
     """
 
     now: PathPrediction
-    without: dict[int, float]
+    without: dict[int, MoveDeviation]
     worst: dict[int, tuple[float, float]]
     objections: dict[int, Objection]
     bent: set[int]
@@ -243,12 +242,23 @@ class _Judged:
         if v in self.now.refusals:
             return Removal(self.now.refusals[v])
         far, share = self.worst[v]
-        if far > self.without[v]:
+        if self._is_no_better(v, far):
             return Removal("inserted points make it no better", share)
         if v in self.objections:
             objection = self.objections[v]
             return Removal(str(objection), objection.place % 1.0, objection.cure)
         return None
+
+    def _is_no_better(self, v: int, far: float) -> bool:
+        """Return True if a move is harmed, or no nearer to its path by both measures.
+
+        Args:
+            v: The move; of an arc, a half.
+            far: How far it leaves its path at the most, however points are rounded [m].
+        """
+        task, usual = self.now.task, self.without[v]
+        now = self.now.deviations[v]._replace(largest=far)
+        return now.is_harmed(usual, task.tolerance) or now.both > usual.both
 
 
 def _with_points(now: PathPrediction) -> set[int]:
@@ -257,19 +267,19 @@ def _with_points(now: PathPrediction) -> set[int]:
 
 
 def _harmful(
-    now: PathPrediction, without: dict[int, float]
+    now: PathPrediction, without: dict[int, MoveDeviation]
 ) -> Iterator[tuple[int, Removal]]:
     """Yield moves with points behind which moves without any are worse for them.
 
     From which flank a joint leaves is a matter of the moves before, and how a corner is
     rounded one of both moves beside it.
     """
-    far = _of_moves(now, now.sizes)
+    far = _of_moves(now, now.deviations)
     cut = np.array(sorted(now.plan.points), dtype=np.int64)
     for v in far.keys() - _with_points(now) - now.plan.approaches.keys():
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
-        if far[v] <= without.get(v, np.inf) + WORSE:
+        if v not in without or far[v].largest <= without[v].largest + WORSE:
             continue
         if near:
             yield int(cut[last]), Removal("a later move would be worse")
@@ -286,7 +296,12 @@ def _objections(now: PathPrediction) -> dict[int, Objection]:
     return found
 
 
-def _of_moves(now: PathPrediction, far: dict[int, float]) -> dict[int, float]:
+def _of_moves(
+    now: PathPrediction, far: Mapping[int, MoveDeviation]
+) -> dict[int, MoveDeviation]:
     """Say of both halves of an arc, which is one move, what the farther one is off."""
-    visits = now.task.visits
-    return {v: max(far.get(row, 0.0) for row in halves(visits, v)) for v in far}
+    visits, found = now.task.visits, dict[int, MoveDeviation]()
+    for v in far:
+        both = [far[row] for row in halves(visits, v) if row in far]
+        found[v] = MoveDeviation(*map(max, zip(*both, strict=True)))
+    return found

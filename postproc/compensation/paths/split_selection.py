@@ -15,6 +15,7 @@ from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,
     PathPrediction,
 )
+from postproc.compensation.paths.path_error import steps_of
 from postproc.compensation.paths.plan_rule import resolution
 from postproc.compensation.paths.split_constraints import shortest_pieces
 
@@ -61,8 +62,7 @@ def _list_far(now: PathPrediction) -> set[int]:
     in the predictions, by which more data could make a path worse.
     """
     paths, task = now.parts[0].paths, now.task
-    step = np.diff(paths.way, prepend=0.0)
-    step[paths.first[:-1]] = 0.0
+    step = steps_of(paths.way, paths.first)
     far = np.where(paths.after.across > task.aim, step, 0.0)
     off, whole = (np.add.reduceat(each, paths.first[:-1]) for each in (far, step))
     far_off = (off > (1.0 - MOST) * whole) | (paths.after.sizes > task.tolerance)

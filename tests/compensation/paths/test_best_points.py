@@ -10,19 +10,21 @@ import numpy as np
 from postproc.compensation.paths.best_points import IN_VAIN, BestPoints
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import PathPrediction
+from postproc.compensation.paths.plan_rule import MoveDeviation
 from postproc.robot.trajectory import Motion
 
 OPEN = {7: (0.0, 0.0, 0.0)}
 
 
-def tried(size: float, *shares: float, refused: str = "") -> Any:
-    """A line with points, and how far it is off with them [m]."""
-    task = Mock()
+def tried(size: float, *shares: float, refused: str = "", within: float = 0.0) -> Any:
+    """A line with points, how far it is off with them, and 95 % of its way [m]."""
+    task = Mock(tolerance=1e-4, deviations={7: MoveDeviation(3e-4, 3e-4)})
     task.visits.motion.kind = np.full(9, int(Motion.LINEAR))
     plan = InsertionPlan(open=OPEN, points={7: shares} if shares else {})
     now = PathPrediction(task, plan, (), np.zeros(9, dtype=np.int64))
     refusals = {7: refused} if refused else {}
-    vars(now).update(sizes={7: size}, flat={}, refusals=refusals)
+    deviations = {7: MoveDeviation(within, size)}
+    vars(now).update(deviations=deviations, flat={}, refusals=refusals)
     return now
 
 
@@ -33,6 +35,16 @@ def test_points_that_did_better_come_back() -> None:
     assert best.restore(tried(2e-4, 0.5, 0.7)).points == {7: (0.5,)}
     assert best.restore(tried(1e-4, 0.5)).points == {7: (0.5,)}
     assert best.restore(tried(5e-5, 0.6)).points == {7: (0.6,)}
+
+
+def test_a_way_that_is_nearer_makes_up_for_a_place_that_is_not() -> None:
+    best = BestPoints().note(tried(3e-4, within=3e-4))
+    nearer = best.note(tried(3.3e-4, 0.5, within=5e-5))
+    assert nearer.restore(tried(3e-4, 0.6, within=3e-4)).points == {7: (0.5,)}
+    harmed = best.note(tried(3.5e-4, 0.5, within=0.0))  # by more than may be
+    assert not harmed.restore(tried(3.5e-4, 0.5, within=0.0)).points
+    farther = best.note(tried(2.9e-4, 0.5, within=3.2e-4))
+    assert not farther.restore(tried(2.9e-4, 0.5, within=3.2e-4)).points
 
 
 def test_points_that_cannot_be_corrected_never_come_back() -> None:

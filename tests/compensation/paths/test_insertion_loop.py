@@ -20,6 +20,7 @@ from postproc.compensation.paths.backlash_preload import TAKEN
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.insertion_prediction import AIM, PathPrediction
 from postproc.compensation.paths.plan_outcomes import BEGINS
+from postproc.compensation.paths.plan_rule import MoveDeviation
 from postproc.compensation.paths.rounded_points import RoundedPoints
 from postproc.model.backlash_width import ahead
 from postproc.model.model import load_model
@@ -792,17 +793,39 @@ def test_an_arc_that_loses_all_points_is_whole_again() -> None:
 
 
 def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
-    def sizes(*mm: float) -> dict[int, float]:
-        return dict(zip([3, 4, 9], np.array(mm) * MM, strict=True))
+    def sizes(*mm: float) -> dict[int, MoveDeviation]:
+        pairs = zip([3, 4, 9], mm, strict=True)
+        return {v: MoveDeviation(0.0, far * MM) for v, far in pairs}
 
     now = Mock(plan=InsertionPlan(points={3: (0.5,)}), cut_arcs=[])
     now.task.visits.motion.kind = [Motion.LINEAR] * 10
     without = sizes(0.3, 0.01, 0.01)
-    now.sizes = sizes(0.02, 0.07, 0.09)
+    now.deviations = sizes(0.02, 0.07, 0.09)
     ((v, (why, *_)),) = prune._harmful(now, without)  # 9 is too far behind
     assert v == 3 and "a later move would be worse" in why
-    now.sizes = sizes(0.02, 0.05, 0.09)
+    now.deviations = sizes(0.02, 0.05, 0.09)
     assert not [*prune._harmful(now, without)]
+
+
+@pytest.mark.parametrize(
+    ("far", "within", "goes"),
+    [
+        (0.129, 0.120, False),
+        (0.138, 0.050, False),  # nearer by what 95 % of the way stays within
+        (0.170, 0.000, True),  # a place farther by 0.041 mm is not made up for
+        (0.120, 0.140, True),
+    ],
+)
+def test_points_are_judged_by_all_of_a_way(
+    far: float, within: float, goes: bool
+) -> None:
+    task = Mock(tolerance=TOLERANCE * MM)
+    now = Mock(task=task, refusals={}, deviations={3: MoveDeviation(within * MM, 0.0)})
+    without = {3: MoveDeviation(0.120 * MM, 0.129 * MM)}
+    judged = prune._Judged(now, without, {3: (far * MM, 0.25)}, {}, set())
+    removal = judged.why_not(3)
+    assert (removal is not None) == goes
+    assert removal is None or "no better" in removal.why
 
 
 def test_a_rounded_point_is_judged_by_the_worst_of_all_its_zones() -> None:
