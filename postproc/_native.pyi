@@ -215,7 +215,7 @@ def to_move(
     rounds: int,
 ) -> Floats: ...
 
-# aims.rs: which sides to correct for (`postproc.compensation.aims`)
+# aims.rs: which sides to correct for (`postproc.compensation.solver.aims`)
 def next_aims(
     core: Core,
     solver: Solver,
@@ -232,7 +232,7 @@ def next_aims(
     watched: tuple[int, int],
 ) -> tuple[Floats, Floats, Floats, Floats]: ...
 
-# commands.rs: what to command (`postproc.compensation.inverse_model`)
+# commands.rs: what to command (`postproc.compensation.solver.inverse_model`)
 def commands(
     core: Core,
     solver: Solver,

@@ -13,10 +13,10 @@ from postproc.calibration.fit import fit
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.survey_program import write_survey
 from postproc.compensation.compensate import compensate
-from postproc.compensation.inverse_model import new_numbers, solve_visits
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, read_program, with_measured_play
 from postproc.compensation.program import states_of as planned_states
+from postproc.compensation.solver.inverse_model import new_numbers, solve_visits
 from postproc.language.visits import Meaning
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model

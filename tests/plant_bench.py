@@ -20,10 +20,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from unittest.mock import patch
 
-from postproc.compensation import micro_batch
-from postproc.compensation.micro_batch import Given
 from postproc.compensation.options import DEFAULT_OPTIONS
-from postproc.compensation.sidecar import restore_file
+from postproc.compensation.output.sidecar import restore_file
+from postproc.compensation.scale import micro_batch
+from postproc.compensation.scale.micro_batch import Given
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
 from tests.batch.dask_cluster import Cluster

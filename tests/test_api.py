@@ -12,7 +12,7 @@ import pytest
 
 import postproc
 from postproc.compensation.outcome import Status
-from postproc.compensation.sidecar import restore_file, sidecar_path
+from postproc.compensation.output.sidecar import restore_file, sidecar_path
 from tests.plant import contents, pages, program
 from tests.written import cli
 

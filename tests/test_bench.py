@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from postproc.compensation.inverse_model import solve
 from postproc.compensation.program import plan_visits, read_program, states_of
+from postproc.compensation.solver.inverse_model import solve
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.beside import _one

@@ -55,11 +55,23 @@ JOINED = {
         "paths.servo_lag",
         "program",
         "program_files",
-        "targets",
+        "solver.targets",
     },
 }
 
 # Which modules know one effect in particular: all others take effects as they come.
+# Who knows that there are windows, processes, and several programs at once.
+SCALED = {
+    "batch.workers": {"micro_batch"},
+    "cli.programs": {"workers"},
+    "compensation.compensate": {"workers"},
+    "compensation.output.rewrite": {"workers"},
+    "compensation.paths.changed_windows": {"windowing"},
+    "compensation.pipeline": {"consensus", "window_work"},
+    "compensation.solver.iterate": {"consensus"},
+    "report.diff": {"workers"},
+}
+
 KNOWING = {
     # What may have changed since the arm was surveyed.
     "calibration.check_design": {"base_shift", "joint_offset", "tool_shift"},
@@ -194,6 +206,16 @@ def test_calibration_knows_compensation_where_a_program_was_measured() -> None:
         and (own := {o for o in ours(name, path) if o.startswith("compensation.")})
     }
     assert found == JOINED
+
+
+def test_few_know_that_long_programs_are_cut() -> None:
+    scale = {n for n, _ in modules() if n.startswith("compensation.scale.")}
+    found = {
+        name: {other.rpartition(".")[2] for other in own}
+        for name, path in modules()
+        if name not in scale and (own := ours(name, path) & scale)
+    }
+    assert found == SCALED
 
 
 def test_an_effect_is_known_to_its_own_file_and_to_the_list() -> None:
@@ -332,12 +354,12 @@ def test_nothing_outside_of_its_folder_names_a_language() -> None:
 def test_there_is_one_way_to_compensate() -> None:
     """The command line and the batch know `compensate` only, none of its steps."""
     steps = {
-        "iterate",
-        "decisions",
-        "rewrite",
-        "inverse_model",
-        "eligibility",
-        "clones",
+        "solver.iterate",
+        "solver.decisions",
+        "solver.inverse_model",
+        "solver.eligibility",
+        "output.rewrite",
+        "output.clones",
     }
     for name, path in modules():
         if name.split(".")[0] in {"cli", "batch", "report"}:

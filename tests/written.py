@@ -10,8 +10,8 @@ from typer.testing import CliRunner, Result
 
 from postproc.arrays import Floats, Ints
 from postproc.cli.commands import app
+from postproc.compensation.output.rewrite import Output, write_edits
 from postproc.compensation.program import ParsedProgram
-from postproc.compensation.rewrite import Output, write_edits
 from postproc.language.text.number_edits import edits as number_edits
 
 FIRST = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"

@@ -21,7 +21,7 @@ import numpy as np
 from intervals import Series, blocks, loaded, predict_rows, random_rows
 
 from postproc.calibration.cross_validation import regions_of
-from postproc.compensation.expected_error import LengthLaw
+from postproc.compensation.solver.expected_error import LengthLaw
 from postproc.exceptions import PostprocError
 
 HEAD = [

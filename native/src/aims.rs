@@ -1,4 +1,4 @@
-//! The sides that targets are corrected for next: `postproc.compensation.aims`.
+//! The sides that targets are corrected for next: `postproc.compensation.solver.aims`.
 //!
 //! A correction moves its target, and with it the position of every joint in its play at
 //! this target and at later ones. So the core solves for the sides in the order of the

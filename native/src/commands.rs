@@ -1,4 +1,4 @@
-//! Commands that land where they should: `postproc.compensation.inverse_model`.
+//! Commands that land where they should: `postproc.compensation.solver.inverse_model`.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;

@@ -13,8 +13,7 @@ from postproc.arrays import data_frame
 from postproc.batch.plan import BatchPlan, make_plan
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import LEFT_ALONE, add_uncorrected
-from postproc.compensation.pages import program_arm, read_head
-from postproc.compensation.sidecar import (
+from postproc.compensation.output.sidecar import (
     FileRecord,
     LeftLine,
     Sidecar,
@@ -22,6 +21,7 @@ from postproc.compensation.sidecar import (
     sha256,
     sidecar_path,
 )
+from postproc.compensation.pages import program_arm, read_head
 from postproc.diagnostics import Code
 from postproc.exceptions import PostprocError, ProgramError
 from postproc.files import (

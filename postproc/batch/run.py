@@ -17,7 +17,7 @@ from postproc.batch.journal import Journal, JournalEntry, Summary, read_entries
 from postproc.batch.plan import BatchPlan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
 from postproc.batch.workers import WorkerPool, work_through
-from postproc.compensation.sidecar import SUFFIX, file_sha256, sha256
+from postproc.compensation.output.sidecar import SUFFIX, file_sha256, sha256
 from postproc.exceptions import DiskFullError, OutputError
 from postproc.files import (
     TEMPORARY,

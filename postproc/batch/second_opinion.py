@@ -11,10 +11,9 @@ from typing import Any
 
 from postproc.batch.plan import BatchPlan, JobSetup, Unit
 from postproc.batch.tree import scan
+from postproc.compensation.findings.second_opinion import second_opinion
 from postproc.compensation.options import Options
-from postproc.compensation.program import prepare_cell
-from postproc.compensation.second_opinion import second_opinion
-from postproc.compensation.sidecar import (
+from postproc.compensation.output.sidecar import (
     SUFFIX,
     FileRecord,
     Sidecar,
@@ -22,6 +21,7 @@ from postproc.compensation.sidecar import (
     restore,
     sidecar_path,
 )
+from postproc.compensation.program import prepare_cell
 from postproc.exceptions import PostprocError
 from postproc.files import read_input
 from postproc.language.languages import file_named

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from postproc.batch.plan import BatchPlan, Unit
+from postproc.compensation.output.sidecar import SUFFIX
 from postproc.compensation.pages import (
     group_pages,
     names_in,
     of_one_arm,
     program_arm,
 )
-from postproc.compensation.sidecar import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
     LARGEST,

@@ -26,11 +26,11 @@ import numpy as np
 
 from postproc import __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, make_failure
-from postproc.compensation.headline import headline
-from postproc.compensation.micro_batch import Given, compensate_batch
+from postproc.compensation.findings.headline import headline
+from postproc.compensation.findings.tolerance import JobTolerance
 from postproc.compensation.outcome import Outcome, Status
-from postproc.compensation.sidecar import SUFFIX
-from postproc.compensation.tolerance import JobTolerance
+from postproc.compensation.output.sidecar import SUFFIX
+from postproc.compensation.scale.micro_batch import Given, compensate_batch
 from postproc.exceptions import PostprocError
 from postproc.language.languages import file_named
 from postproc.operating_system import end_with_parent, start_worker_server

@@ -210,7 +210,7 @@ def _stale_below(source: Path) -> frozenset[str]:
 def _list_releases(order: BatchOptions) -> list[Release]:
     """List the programs of a tree that were compensated for robots with numbers."""
     from postproc.batch.journal import read_entries
-    from postproc.compensation.sidecar import read_sidecar, sidecar_path
+    from postproc.compensation.output.sidecar import read_sidecar, sidecar_path
     from postproc.record.robots import Release
 
     setups = [(s.model.id, s.cell.file.robot.serial_number) for s in order.plan.setups]

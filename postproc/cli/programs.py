@@ -124,11 +124,11 @@ def compensate(
     """
     from postproc.cli.common import stages
     from postproc.cli.job_files import Destination, default_output
-    from postproc.compensation import workers
     from postproc.compensation.compensate import compensate as run
+    from postproc.compensation.findings.tolerance import JobTolerance
     from postproc.compensation.options import Options
     from postproc.compensation.program_files import ProgramFiles
-    from postproc.compensation.tolerance import JobTolerance
+    from postproc.compensation.scale import workers
     from postproc.model.model import as_model
     from postproc.report.json import report_text
     from postproc.robot.cell import load_cell
@@ -191,7 +191,7 @@ def _release(
         return
 
     def list_releases() -> list[Release]:
-        from postproc.compensation.sidecar import file_sha256
+        from postproc.compensation.output.sidecar import file_sha256
         from postproc.record.robots import Release
 
         return [Release(serial, program, target, model, file_sha256(target))]
@@ -296,7 +296,7 @@ def restore(
     ] = None,
 ) -> None:
     """Restore the original program, byte for byte, from its record."""
-    from postproc.compensation.sidecar import restore_file
+    from postproc.compensation.output.sidecar import restore_file
 
     with report_errors():
         for path in restore_file(compensated, output):

@@ -8,10 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from postproc.arrays import release_memory
-from postproc.compensation.arrivals import ArrivalStates
-from postproc.compensation.base_frame_check import check_base
-from postproc.compensation.expected_error import expect_errors
-from postproc.compensation.findings import (
+from postproc.compensation.findings.base_frame_check import check_base
+from postproc.compensation.findings.findings import (
     controller_unknown,
     flank_steps,
     list_followed_pages,
@@ -26,7 +24,7 @@ from postproc.compensation.findings import (
     report_uncertain_sides,
     tool_in_metres,
 )
-from postproc.compensation.first_cause import read_with_cause
+from postproc.compensation.findings.first_cause import read_with_cause
 from postproc.compensation.options import (
     DEFAULT_OPTIONS,
     Clock,
@@ -42,6 +40,12 @@ from postproc.compensation.outcome import (
     list_uncorrected_elsewhere,
     tell_arrivals,
 )
+from postproc.compensation.output.rewrite import (
+    Output,
+    check_output,
+    write_edits,
+)
+from postproc.compensation.output.sidecar import Sidecar
 from postproc.compensation.pipeline import correct
 from postproc.compensation.program import (
     ParsedProgram,
@@ -53,15 +57,11 @@ from postproc.compensation.program_files import (
     ProgramFiles,
     program_files,
 )
-from postproc.compensation.rewrite import (
-    Output,
-    check_output,
-    write_edits,
-)
-from postproc.compensation.sidecar import Sidecar
-from postproc.compensation.targets import report_rounded_points, unknown_blends
+from postproc.compensation.scale.workers import in_worker
+from postproc.compensation.solver.arrivals import ArrivalStates
+from postproc.compensation.solver.expected_error import expect_errors
+from postproc.compensation.solver.targets import report_rounded_points, unknown_blends
 from postproc.compensation.window_result import CompensatedProgram, WindowResult
-from postproc.compensation.workers import in_worker
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
@@ -126,7 +126,7 @@ def compensate(
     outcome = replace(outcome, diagnostics=told, inputs=given.inputs)
     if not judged:
         return outcome
-    from postproc.compensation.second_opinion import second_opinion
+    from postproc.compensation.findings.second_opinion import second_opinion
 
     output = {**outcome.sources, **outcome.outputs}
     own = prepare_cell(cell, model, options)
@@ -253,7 +253,7 @@ def _write_timed(
     reading: ParsedProgram, kept: WindowResult, setting: Job
 ) -> CompensatedProgram:
     """Write a program without points, and run it in time."""
-    from postproc.compensation.timing_comparison import run_in_time
+    from postproc.compensation.findings.timing_comparison import run_in_time
 
     output, again = write_and_verify(reading, kept, setting)
     with setting.clock("time"):

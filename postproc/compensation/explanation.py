@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints, Signs, columns_of, data_frame
 from postproc.compensation.compensate import compensate_files
+from postproc.compensation.findings.timing_comparison import InTime
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import (
@@ -21,7 +22,6 @@ from postproc.compensation.program import (
     read_program,
 )
 from postproc.compensation.program_files import NO_PAGES, ProgramFiles, program_files
-from postproc.compensation.timing_comparison import InTime
 from postproc.diagnostics import Reason
 from postproc.exceptions import ProgramError
 from postproc.language.languages import UNNAMED

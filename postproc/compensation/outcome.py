@@ -20,7 +20,7 @@ from postproc.arrays import (
     columns_of,
     data_frame,
 )
-from postproc.compensation.sidecar import (
+from postproc.compensation.output.sidecar import (
     LeftLine,
     Sidecar,
     file_sha256,
@@ -47,11 +47,11 @@ from postproc.robot.pose import MM
 
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.arrays import DataFrame
-    from postproc.compensation.arrivals import ArrivalStates
-    from postproc.compensation.expected_error import ExpectedErrors
-    from postproc.compensation.headline import ProgramErrors
-    from postproc.compensation.timing_comparison import InTime
-    from postproc.compensation.tolerance import JobTolerance, ToleranceCheck
+    from postproc.compensation.findings.headline import ProgramErrors
+    from postproc.compensation.findings.timing_comparison import InTime
+    from postproc.compensation.findings.tolerance import JobTolerance, ToleranceCheck
+    from postproc.compensation.solver.arrivals import ArrivalStates
+    from postproc.compensation.solver.expected_error import ExpectedErrors
     from postproc.verify.opinion import Opinion
 
 # What came of a program: every visit with its status, and the exit code.
@@ -258,7 +258,7 @@ class Outcome:
         """
         if tolerance is None:
             return self
-        from postproc.compensation.tolerance import check_tolerance
+        from postproc.compensation.findings.tolerance import check_tolerance
 
         if self.expected is None:
             raise PostprocError("--tolerance: how the arm arrives is not known")
@@ -271,7 +271,7 @@ class Outcome:
         """What is known of its expected errors; None where they are not known."""
         if self.expected is None:
             return None
-        from postproc.compensation.headline import ProgramErrors
+        from postproc.compensation.findings.headline import ProgramErrors
 
         d = self.decisions
         return ProgramErrors(
@@ -287,7 +287,7 @@ class Outcome:
 
     def summary(self) -> str:
         """Say what came of the program, the worst first."""
-        from postproc.compensation.headline import headline
+        from postproc.compensation.findings.headline import headline
 
         d = self.decisions
         counts = ", ".join(

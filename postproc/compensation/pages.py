@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from postproc.compensation.sidecar import sidecar_path
+from postproc.compensation.output.sidecar import sidecar_path
 from postproc.files import read_if_readable
 from postproc.language.languages import file_named
 from postproc.language.text.stamp import read_stamp

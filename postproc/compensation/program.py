@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.eligibility import (
+from postproc.compensation.options import Options
+from postproc.compensation.solver.eligibility import (
     CONTRADICTED,
     Reasons,
     find_stops,
@@ -17,9 +18,8 @@ from postproc.compensation.eligibility import (
     mark_orientation_interpolation,
     mark_stranded,
 )
-from postproc.compensation.options import Options
-from postproc.compensation.payload import payload_of
-from postproc.compensation.targets import targets_from_visits, with_tracks
+from postproc.compensation.solver.payload import payload_of
+from postproc.compensation.solver.targets import targets_from_visits, with_tracks
 from postproc.language.language import Start
 from postproc.language.languages import language_of
 from postproc.language.text.number_edits import Skeleton

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from postproc.compensation.output.sidecar import sidecar_path
 from postproc.compensation.pages import (
     group_pages,
     is_output,
@@ -18,7 +19,6 @@ from postproc.compensation.pages import (
     program_arm,
     read_head,
 )
-from postproc.compensation.sidecar import sidecar_path
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.files import (

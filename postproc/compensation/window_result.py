@@ -20,12 +20,12 @@ from postproc.arrays import (
     any_in_rows,
     isin_sorted,
 )
-from postproc.compensation.decisions import NONE, with_what_moves_along
-from postproc.compensation.eligibility import find_overruled
-from postproc.compensation.expected_error import ErrorLaws, LengthLaw
-from postproc.compensation.iterate import Converged
 from postproc.compensation.outcome import Decisions, find_judged
 from postproc.compensation.program import ParsedProgram, PlannedProgram
+from postproc.compensation.solver.decisions import NONE, with_what_moves_along
+from postproc.compensation.solver.eligibility import find_overruled
+from postproc.compensation.solver.expected_error import ErrorLaws, LengthLaw
+from postproc.compensation.solver.iterate import Converged
 from postproc.diagnostics import NO_REASON
 from postproc.language.text.source import Replacements
 from postproc.language.visits import Visits
@@ -35,8 +35,8 @@ from postproc.robot.pose import MM
 from postproc.robot.state import States
 
 if TYPE_CHECKING:
-    from postproc.compensation.rewrite import Output
-    from postproc.compensation.timing_comparison import InTime
+    from postproc.compensation.findings.timing_comparison import InTime
+    from postproc.compensation.output.rewrite import Output
 
 T = TypeVar("T", bound="WindowResult | Decisions | ErrorLaws | LengthLaw")
 Make = Callable[[tuple[int, ...], np.dtype[Any]], NDArray[Any]]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.sidecar import file_sha256, restore_file
+from postproc.compensation.output.sidecar import file_sha256, restore_file
 from postproc.exceptions import PostprocError, RecordError
 from postproc.record.database import Record
 from postproc.record.life import Life

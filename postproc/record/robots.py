@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from postproc.compensation.sidecar import sha256
+from postproc.compensation.output.sidecar import sha256
 from postproc.exceptions import RecordError
 from postproc.files import read_input
 from postproc.model.effects.effect import EVENTS

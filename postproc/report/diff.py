@@ -21,7 +21,7 @@ from postproc.compensation.outcome import (
     Status,
     read_arrivals,
 )
-from postproc.compensation.workers import in_background
+from postproc.compensation.scale.workers import in_background
 from postproc.files import (
     NamedText,
     open_text,

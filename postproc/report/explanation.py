@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.explanation import Explanation
 from postproc.compensation.outcome import Status
+from postproc.compensation.solver.arrivals import ArrivalStates
 from postproc.exceptions import printable
 from postproc.files import schema
 from postproc.report.json import target_rows

@@ -8,10 +8,10 @@ from dataclasses import asdict
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.findings.timing_comparison import InTime
 from postproc.compensation.paths.corner_error import RoundOff
 from postproc.compensation.paths.insertion_report import Insertions
 from postproc.compensation.paths.path_error import Deviations, PathAccuracy
-from postproc.compensation.timing_comparison import InTime
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle_time import ProgramCycle

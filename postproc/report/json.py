@@ -21,8 +21,8 @@ from postproc.arrays import (
     text_of,
     whole,
 )
-from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
+from postproc.compensation.solver.arrivals import ArrivalStates
 from postproc.files import schema
 from postproc.language.visits import Meaning, Visits
 from postproc.report.head import ReportHead

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from postproc.compensation.headline import (
+from postproc.compensation.findings.headline import (
     TargetException,
     headline,
     list_exceptions,
 )
+from postproc.compensation.findings.tolerance import ToleranceCheck, Verdict
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.tolerance import ToleranceCheck, Verdict
 from postproc.robot.pose import MM
 
 WORST = 10  # visits that are listed

@@ -13,7 +13,7 @@ from postproc.batch.plan import make_plan
 from postproc.batch.run import BatchOptions, batch, check_room, default_log, lock_folder
 from postproc.batch.workers import LocalPool
 from postproc.compensation.options import DEFAULT_OPTIONS
-from postproc.compensation.sidecar import restore_file
+from postproc.compensation.output.sidecar import restore_file
 from postproc.exceptions import CellError, DiskFullError, OutputError, PostprocError
 from postproc.language.text.stamp import read_stamp
 from tests.inline import InlinePool

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.inverse_model import solve
 from postproc.compensation.program import plan_visits, read_program, states_of
+from postproc.compensation.solver.inverse_model import solve
 from postproc.language.pdl2.program import parse
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.logical_lines import read_lines

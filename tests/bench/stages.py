@@ -11,9 +11,9 @@ from tempfile import TemporaryDirectory
 
 from postproc.cli.job_files import Destination
 from postproc.cli.reports import Reports
-from postproc.compensation import workers
 from postproc.compensation.compensate import compensate
 from postproc.compensation.program_files import ProgramFiles
+from postproc.compensation.scale import workers
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
 from tests.any_controller import any_controller

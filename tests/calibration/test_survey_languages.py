@@ -12,9 +12,9 @@ from postproc.calibration.fit import fit
 from postproc.calibration.survey_program import BACK, write_survey
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
+from postproc.compensation.output.sidecar import restore_file
 from postproc.compensation.program import plan_visits, read_program
 from postproc.compensation.program_files import find_pages
-from postproc.compensation.sidecar import restore_file
 from postproc.language.languages import languages
 from postproc.language.measuring_program import SHARE, name_of_file
 from postproc.report.simulation import simulate_file

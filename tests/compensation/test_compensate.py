@@ -11,8 +11,8 @@ import pytest
 
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
+from postproc.compensation.output.sidecar import FileRecord, restore
 from postproc.compensation.program import read_program
-from postproc.compensation.sidecar import FileRecord, restore
 from postproc.exceptions import CellError, ModelError, ProgramError
 from postproc.report.json import report_text
 from postproc.report.simulation import setup_of

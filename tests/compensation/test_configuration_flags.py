@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.eligibility import find_overruled
-from postproc.compensation.findings import list_overruled_strings
+from postproc.compensation.findings.findings import list_overruled_strings
 from postproc.compensation.program import (
     ParsedProgram,
     PlannedProgram,
     plan_visits,
     read_program,
 )
+from postproc.compensation.solver.eligibility import find_overruled
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 

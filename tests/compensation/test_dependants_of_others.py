@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.decisions import with_dependants, with_origins
 from postproc.compensation.program import plan_visits, read_program
+from postproc.compensation.solver.decisions import with_dependants, with_origins
 from tests.written import FIRST, program
 
 LINES = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.targets import rounding_of
+from postproc.compensation.solver.targets import rounding_of
 from postproc.language.visits import Blend, ZoneRule
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly

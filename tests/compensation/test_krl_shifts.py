@@ -10,7 +10,7 @@ import pytest
 
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
-from postproc.compensation.sidecar import restore
+from postproc.compensation.output.sidecar import restore
 from postproc.exceptions import ProgramError
 from tests.compensation.shift_jobs import (
     AGREED_MM,

@@ -10,7 +10,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
-from postproc.compensation.targets import UNNAMED
+from postproc.compensation.solver.targets import UNNAMED
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import record_from_pose

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.inverse_model import turn_std
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
+from postproc.compensation.solver.inverse_model import turn_std
 from postproc.exceptions import ModelError
 from postproc.language.visits import Visits
 from postproc.report.simulation import setup_of

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from postproc.compensation.output.sidecar import sidecar_path
 from postproc.compensation.pages import names_in
 from postproc.compensation.program_files import find_pages
-from postproc.compensation.sidecar import sidecar_path
 from postproc.language.text.source import Source
 from postproc.language.text.stamp import stamp_line
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.findings import SURE
+from postproc.compensation.findings.findings import SURE
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import read_program
 from postproc.model.model import load_model

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation import windowing
-from postproc.compensation.micro_batch import Given, compensate_batch
 from postproc.compensation.options import Options
-from postproc.compensation.sidecar import restore
+from postproc.compensation.output.sidecar import restore
+from postproc.compensation.scale import windowing
+from postproc.compensation.scale.micro_batch import Given, compensate_batch
 from postproc.exceptions import ProgramError
 from tests.compensation.shift_jobs import (
     AGREED_MM,

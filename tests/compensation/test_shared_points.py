@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.clones import (
+from postproc.compensation.output.clones import (
     MoveSlot,
     SlotArrivals,
     group_arrivals,

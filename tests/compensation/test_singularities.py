@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from postproc.compensation import iterate
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome, Status
-from postproc.compensation.rewrite import VerificationError
+from postproc.compensation.output.rewrite import VerificationError
+from postproc.compensation.solver import iterate
 from postproc.robot.state import make_states
 from postproc.simulation.kinematics import _nj220
 
@@ -202,7 +202,7 @@ def test_output_that_no_guard_held_back_is_refused(
     job_cell, everywhere, monkeypatch
 ) -> None:
     """A defect of ours: the check of what was written does not trust the guards."""
-    from postproc.compensation import decisions
+    from postproc.compensation.solver import decisions
 
     monkeypatch.setattr(decisions, "guard_motion", lambda *given: None)
     monkeypatch.setattr(

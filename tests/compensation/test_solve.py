@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compensation.inverse_model import solve
+from postproc.compensation.solver.inverse_model import solve
 from postproc.robot.state import make_states
 from tests.calibration.simulator import NJ, TOOL, random_arm, random_states
 from tests.model.test_model import model

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from postproc.compensation.continuity import CURVE
 from postproc.compensation.outcome import Status
+from postproc.compensation.solver.continuity import CURVE
 from postproc.robot.cell import load_cell
 from tests.compensation.curved import (
     CELL,

@@ -10,7 +10,7 @@ import pytest
 
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.compensation.targets import find_open_corners
+from postproc.compensation.solver.targets import find_open_corners
 from postproc.language.visits import ZoneRule
 from postproc.motion.spline_moves import turns_at_unknown_blends
 from postproc.motion.targets import Fly

@@ -12,9 +12,9 @@ import numpy as np
 
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
+from postproc.compensation.output.rewrite import check_output, read_back
+from postproc.compensation.output.sidecar import FileRecord, Sidecar, restore
 from postproc.compensation.program import read_program
-from postproc.compensation.rewrite import check_output, read_back
-from postproc.compensation.sidecar import FileRecord, Sidecar, restore
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import Model

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.findings import SURE
+from postproc.compensation.findings.findings import SURE
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.model.model import Model

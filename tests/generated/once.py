@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from postproc.compensation.findings import SURE
+from postproc.compensation.findings.findings import SURE
 from postproc.compensation.outcome import Outcome, Status
 from tests.generated.found import DONE, Found
 from tests.language.pdl2.executed import Executed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.targets import find_open_corners
+from postproc.compensation.solver.targets import find_open_corners
 
 RAPID = """MODULE job
 PERS wobjdata w:=[FALSE,TRUE,"",[[600,1300,2300],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];

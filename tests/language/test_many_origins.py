@@ -3,7 +3,7 @@
 import pytest
 
 from postproc.compensation.program import ParsedProgram, read_program
-from postproc.compensation.targets import find_open_corners
+from postproc.compensation.solver.targets import find_open_corners
 from postproc.language.analysis.interpreter import Interpreter
 from postproc.language.analysis.origins import MOST_ORIGINS
 from postproc.language.visits import ELSEWHERE, START

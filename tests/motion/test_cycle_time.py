@@ -11,7 +11,7 @@ import pytest
 
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.program import prepare_cell, read_program
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.motion.arrival_times import MOST_SAMPLES
 from postproc.motion.cycle_time import ProgramCycle, run
 from postproc.motion.directions_from_trajectory import disagreements, read_directions

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.motion import replan as replan_module
 from postproc.motion.replan import Replanned, replan, replan_all
 from postproc.motion.targets import TargetKind, Targets

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.targets import targets_from_visits
-from postproc.compensation.windowing import Window, cut_points
+from postproc.compensation.scale.windowing import Window, cut_points
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.language.visits import Visits
 from postproc.motion.joint_path import NOWHERE, StartState
 from postproc.motion.planner import plan

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.motion import joint_path as module
 from postproc.motion.joint_path import Trace, trace
 from postproc.motion.targets import TargetKind, Targets

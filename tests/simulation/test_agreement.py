@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.motion.planner import plan
 from postproc.report.simulation import setup_of
 from postproc.robot.arm import load_arm

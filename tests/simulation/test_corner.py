@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.language.visits import Blend, Visits, ZoneRule
 from postproc.motion.planner import plan
 from postproc.robot.cell import load_cell

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.language.visits import Meaning, Visits
 from postproc.motion.planner import plan
 from postproc.robot.cell import Cell, load_cell

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.compensation import second_opinion as planner
-from postproc.compensation.second_opinion import facts_of
+from postproc.compensation.findings import second_opinion as planner
+from postproc.compensation.findings.second_opinion import facts_of
 from postproc.model.model import Model, load_model
 from postproc.motion.planner import plan
 from postproc.robot.arm import Arm, build_arm

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from postproc.compensation.compensate import compensate
+from postproc.compensation.findings.second_opinion import second_opinion
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import prepare_cell
 from postproc.compensation.program_files import read_files
-from postproc.compensation.second_opinion import second_opinion
 from postproc.language.languages import file_named
 from postproc.model.model import Model, load_model
 from postproc.report.simulation import chain_of

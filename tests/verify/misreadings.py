@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.compensation import second_opinion as planner
+from postproc.compensation.findings import second_opinion as planner
 from postproc.language.visits import Meaning, Visits
 from postproc.model.model import Model, load_model
 from postproc.robot.arm import build_arm

@@ -100,7 +100,7 @@ def test_joint_limits_disagree_either_way(cases, within) -> None:
 
 
 def test_an_arm_without_speeds_has_no_times(cases) -> None:
-    from postproc.compensation.second_opinion import facts_of
+    from postproc.compensation.findings.second_opinion import facts_of
     from postproc.verify.judge import judge
 
     one = cases["handling.pdl"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.compensation.second_opinion import facts_of
+from postproc.compensation.findings.second_opinion import facts_of
 from postproc.verify import positions
 from postproc.verify.judge import judge
 from postproc.verify.opinion import TIME_UP, Allowance

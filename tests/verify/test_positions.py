@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.second_opinion import facts_of
+from postproc.compensation.findings.second_opinion import facts_of
 from postproc.robot.arm import load_arm
 from postproc.robot.arm_file import list_shipped_arms
 from postproc.robot.cell import load_cell

@@ -32,7 +32,7 @@ from postproc.compensation.paths.servo_lag import ServoLag, servo_lag
 from postproc.compensation.paths.track_alignment import Aligned, OnTheWay, Track, align
 from postproc.compensation.program import read_program, with_measured_play
 from postproc.compensation.program_files import read_files
-from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.solver.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import READING, Model, as_model

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.findings.timing_comparison import InTime
 from postproc.compensation.options import Job
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.paths.backlash_preload import cross_at_once
 from postproc.compensation.paths.insertion_plan import InsertionPlan
 from postproc.compensation.paths.path_error import PathAccuracy
 from postproc.compensation.program import ParsedProgram
-from postproc.compensation.timing_comparison import InTime
+from postproc.compensation.scale.windowing import cut_points
 from postproc.compensation.window_result import WindowResult
-from postproc.compensation.windowing import cut_points
 from postproc.diagnostics import Code
 from postproc.language.visits import Graph, Meaning, Visits
 from postproc.model.backlash_width import half_widths

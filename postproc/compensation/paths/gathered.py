@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.output.rewrite import read_back
 from postproc.compensation.paths.changed_windows import Part
 from postproc.compensation.program import ParsedProgram
-from postproc.compensation.rewrite import read_back
 from postproc.compensation.window_result import WindowResult, join_windows
 from postproc.language.text.number_edits import edits
 from postproc.motion.cycle_time import ProgramCycle

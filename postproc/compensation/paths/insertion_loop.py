@@ -36,6 +36,7 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.compensation.findings.timing_comparison import run_in_time
 from postproc.compensation.options import Job
 from postproc.compensation.paths.arc_splitting import (
     cut_at_vias,
@@ -59,7 +60,6 @@ from postproc.compensation.paths.prune import judge
 from postproc.compensation.paths.reapproach import insert_reapproaches
 from postproc.compensation.paths.split_selection import find_split
 from postproc.compensation.program import ParsedProgram
-from postproc.compensation.timing_comparison import run_in_time
 from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.language.languages import language_of
 

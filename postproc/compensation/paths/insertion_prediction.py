@@ -10,7 +10,13 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.compensation.findings.timing_comparison import (
+    InTime,
+    run_in_time,
+    run_visits,
+)
 from postproc.compensation.options import Job
+from postproc.compensation.output.rewrite import Output
 from postproc.compensation.paths import changed_windows
 from postproc.compensation.paths.arcs import (
     STRAIGHT,
@@ -53,8 +59,6 @@ from postproc.compensation.paths.write_points import (
 )
 from postproc.compensation.pipeline import correct
 from postproc.compensation.program import ParsedProgram
-from postproc.compensation.rewrite import Output
-from postproc.compensation.timing_comparison import InTime, run_in_time, run_visits
 from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.language.insert_moves import Splitter
 from postproc.language.visits import Visits

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Floats, spans
+from postproc.compensation.findings.timing_comparison import InTime
 from postproc.compensation.options import Job
 from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.backlash_preload import (
@@ -15,7 +16,6 @@ from postproc.compensation.paths.backlash_preload import (
     find_drive_turns,
 )
 from postproc.compensation.paths.insertion_plan import InsertionPlan
-from postproc.compensation.timing_comparison import InTime
 from postproc.language.visits import Visits
 from postproc.model.flank_hypotheses import FlankOfJoint
 

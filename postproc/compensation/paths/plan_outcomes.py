@@ -11,7 +11,6 @@ import numpy as np
 
 from postproc import _native
 from postproc.arrays import Bools, Floats, Ints, spans
-from postproc.compensation.expected_error import SIDED
 from postproc.compensation.paths.flank_cases import OF_ALL, Key
 from postproc.compensation.paths.path_error import (
     PathAccuracy,
@@ -28,6 +27,7 @@ from postproc.compensation.paths.plan_rule import (
     negligible,
     tolerable_harm,
 )
+from postproc.compensation.solver.expected_error import SIDED
 from postproc.model.flank_hypotheses import OPEN, FlankKind
 from postproc.model.variance import covariance_times
 from postproc.robot.pose import MM, lengths

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
-from postproc.compensation.approach_advice import place_to_approach
-from postproc.compensation.findings import SURE
+from postproc.compensation.findings.approach_advice import place_to_approach
+from postproc.compensation.findings.findings import SURE
 from postproc.compensation.outcome import Status
 from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,

@@ -18,7 +18,7 @@ from postproc.compensation.paths.arcs import (
     hindrances_of_arcs,
     is_arc,
 )
-from postproc.compensation.payload import payload_of
+from postproc.compensation.solver.payload import payload_of
 from postproc.language.insert_moves import ArcPiece, Splitter
 from postproc.language.text.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits

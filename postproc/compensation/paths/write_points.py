@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.equivalence import equivalent
-from postproc.compensation.inverse_model import base_in_uframe
+from postproc.compensation.output.equivalence import equivalent
+from postproc.compensation.output.rewrite import VerificationError
 from postproc.compensation.paths.arcs import Chords, CutArc, is_arc
 from postproc.compensation.paths.backlash_preload import BacklashPreload
 from postproc.compensation.paths.insertion_report import Points
 from postproc.compensation.paths.meant_sides import MeantSides
 from postproc.compensation.program import ParsedProgram, read_program
-from postproc.compensation.rewrite import VerificationError
+from postproc.compensation.solver.inverse_model import base_in_uframe
 from postproc.language.insert_moves import Splitter
 from postproc.language.languages import language_of
 from postproc.language.text.source import Edit, Source, apply, compose

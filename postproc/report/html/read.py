@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from postproc.compensation.sidecar import (
+from postproc.compensation.output.sidecar import (
     FileRecord,
     read_sidecar,
     restore,

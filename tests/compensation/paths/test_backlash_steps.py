@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.compensation.findings.timing_comparison import describe_verification
 from postproc.compensation.paths.backlash_steps import (
     FlankSteps,
     in_motion,
     measure_steps,
 )
 from postproc.compensation.paths.track_alignment import align
-from postproc.compensation.timing_comparison import describe_verification
 from tests.compensation.paths.measured_ways import MOVES, STEP, made_ways, read
 from tests.compensation.paths.test_track_alignment import STOPS
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from postproc.compensation.findings.timing_comparison import run_visits
 from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.paths.fast_stops import predict_fast_stops
 from postproc.compensation.program import prepare_cell, read_program
-from postproc.compensation.timing_comparison import run_visits
 from postproc.model.backlash_width import half_widths
 from postproc.model.model import CONFIRMED, Model
 from postproc.motion.cycle_time import ProgramCycle

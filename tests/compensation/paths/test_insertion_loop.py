@@ -30,6 +30,7 @@ from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.program import land
+from tests.compensation.findings.test_approach_advice import job as approaches
 from tests.compensation.paths.test_path_error import (
     ARM,
     CELL,
@@ -42,7 +43,6 @@ from tests.compensation.paths.test_path_error import (
     job,
     pos,
 )
-from tests.compensation.test_approach_advice import job as approaches
 from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]

@@ -12,10 +12,10 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from postproc.compensation.findings.timing_comparison import InTime, run_in_time
 from postproc.compensation.options import DEFAULT_OPTIONS, Clock, Job, no_progress
 from postproc.compensation.paths.path_error import apart
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
-from postproc.compensation.timing_comparison import InTime, run_in_time
 from postproc.language.visits import Visits
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.flank_hypotheses import FlankKind

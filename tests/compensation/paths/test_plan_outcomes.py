@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.expected_error import SIDED
 from postproc.compensation.paths.flank_cases import OF_ALL, FlankCase, FlankCases
 from postproc.compensation.paths.plan_outcomes import (
     BEGINS,
@@ -22,6 +21,7 @@ from postproc.compensation.paths.plan_outcomes import (
     find_largest,
 )
 from postproc.compensation.paths.plan_outcomes import compare as compare_moves
+from postproc.compensation.solver.expected_error import SIDED
 from postproc.model.flank_hypotheses import OPEN, FlankKind, FlankOfJoint
 from postproc.model.variance import covariance_of
 from postproc.robot.pose import MM

@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from postproc.arrays import Floats
-from postproc.compensation.equivalence import equivalent
+from postproc.compensation.output.equivalence import equivalent
+from postproc.compensation.output.rewrite import VerificationError
 from postproc.compensation.paths.backlash_preload import BacklashPreload
 from postproc.compensation.paths.write_points import (
     PathPoints,
@@ -20,7 +21,6 @@ from postproc.compensation.paths.write_points import (
     without,
 )
 from postproc.compensation.program import ParsedProgram, read_program
-from postproc.compensation.rewrite import VerificationError
 from postproc.language.pdl2.insert_moves import Pdl2Splitter
 from postproc.language.pdl2.language import Pdl2
 from postproc.language.pdl2.program import parse

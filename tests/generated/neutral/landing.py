@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.findings import SURE
+from postproc.compensation.findings.findings import SURE
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import DONE, NOT_ALL, Outcome, Status
-from postproc.compensation.sidecar import restore
+from postproc.compensation.output.sidecar import restore
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Blend, Meaning, Visits, ZoneRule
 from postproc.model.model import Model

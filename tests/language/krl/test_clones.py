@@ -10,8 +10,8 @@ import pytest
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
+from postproc.compensation.output.sidecar import restore
 from postproc.compensation.program import read_program
-from postproc.compensation.sidecar import restore
 from postproc.report.simulation import setup_of
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from postproc.compensation.outcome import Decisions, Outcome, Status
-from postproc.compensation.sidecar import Sidecar
+from postproc.compensation.output.sidecar import Sidecar
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.visits import Diagnostic, Literals, NumberPlaces, Visits

@@ -1,0 +1,1 @@
+"""What is said of a compensated program beside its numbers."""

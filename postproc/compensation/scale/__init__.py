@@ -1,0 +1,1 @@
+"""Long programs in windows, in several processes; several programs at once."""

@@ -1,0 +1,1 @@
+"""What every target is corrected by, and which targets keep their values."""
