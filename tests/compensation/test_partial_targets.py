@@ -11,7 +11,7 @@ from postproc.compensation.options import DEFAULT_OPTIONS
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, prepare_cell, read_program
 from postproc.compensation.scale.windowing import cut_points
-from postproc.compensation.solver.decisions import with_dependants
+from postproc.compensation.solver.dependants import with_dependants
 from postproc.language.krl.moves import PARTIAL
 from postproc.motion.targets import AMBIGUOUS, CODE, NO_TARGET
 from tests.compensation.curved import (  # noqa: F401

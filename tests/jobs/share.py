@@ -31,7 +31,7 @@ from postproc.calibration.fit import fit
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
-from postproc.compensation.solver.decisions import HOLDS_NONE
+from postproc.compensation.solver.unchanged import HOLDS_NONE
 from postproc.exceptions import PostprocError
 from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED

@@ -18,7 +18,7 @@ from postproc.compensation.output.sidecar import (
 )
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.scale.workers import in_background
-from postproc.compensation.solver.decisions import limit_violations
+from postproc.compensation.solver.guards import limit_violations
 from postproc.compensation.solver.shifts import shift_values
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of

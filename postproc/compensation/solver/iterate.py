@@ -31,14 +31,10 @@ from postproc.compensation.scale.consensus import (
 from postproc.compensation.solver.aims import NO_STATES, NextAims, next_aims
 from postproc.compensation.solver.arc_angles import ArcAngles
 from postproc.compensation.solver.arc_turns import ArcTurns
-from postproc.compensation.solver.decisions import (
-    Beforehand,
-    Proposal,
-    Round,
-    limit_violations,
-    with_origins,
-)
+from postproc.compensation.solver.decisions import Beforehand, Proposal, Round
+from postproc.compensation.solver.dependants import with_origins
 from postproc.compensation.solver.flag_borders import turn_from_borders
+from postproc.compensation.solver.guards import limit_violations
 from postproc.compensation.solver.inverse_model import (
     Commands,
     foresee,

@@ -9,7 +9,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, read_program
-from postproc.compensation.solver.decisions import WITH_BEGIN, WITH_POINT
+from postproc.compensation.solver.dependants import WITH_BEGIN, WITH_POINT
 from tests.language.krl.test_clones import SIDES
 from tests.language.krl.test_clones import moves as krl_job
 from tests.language.rapid.test_clones import TWICE, P

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import plan_visits, read_program
-from postproc.compensation.solver.decisions import with_dependants, with_origins
+from postproc.compensation.solver.dependants import with_dependants, with_origins
 from tests.written import FIRST, program
 
 LINES = (
