@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.compensation.solver.eligibility import STRANDED
+from postproc.compensation.eligibility.configuration_flags import STRANDED
 from postproc.language.visits import Meaning
 from tests.generated.found import (
     ALL,

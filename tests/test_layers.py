@@ -357,7 +357,7 @@ def test_there_is_one_way_to_compensate() -> None:
         "solver.iterate",
         "solver.decisions",
         "solver.inverse_model",
-        "solver.eligibility",
+        "eligibility.configuration_flags",
         "output.rewrite",
         "output.clones",
     }

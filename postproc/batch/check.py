@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from postproc.arrays import data_frame
 from postproc.batch.plan import BatchPlan, make_plan
 from postproc.compensation.options import DEFAULT_OPTIONS
-from postproc.compensation.outcome import LEFT_ALONE, add_uncorrected
+from postproc.compensation.outcome import LEFT_ALONE
+from postproc.compensation.output.line_outcomes import add_uncorrected
 from postproc.compensation.output.sidecar import (
     FileRecord,
     LeftLine,

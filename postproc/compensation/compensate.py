@@ -33,10 +33,8 @@ from postproc.compensation.options import (
     Progress,
     no_progress,
 )
-from postproc.compensation.outcome import (
-    Outcome,
-    find_judged,
-    largest_motion,
+from postproc.compensation.outcome import Outcome, find_judged, largest_motion
+from postproc.compensation.output.line_outcomes import (
     list_uncorrected_elsewhere,
     tell_arrivals,
 )

@@ -8,16 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.options import Options
-from postproc.compensation.solver.eligibility import (
+from postproc.compensation.eligibility.arcs import mark_arcs
+from postproc.compensation.eligibility.configuration_flags import (
     CONTRADICTED,
-    Reasons,
     find_stops,
-    mark_arcs,
     mark_configuration_flags,
-    mark_orientation_interpolation,
     mark_stranded,
 )
+from postproc.compensation.eligibility.orientation import mark_orientation_interpolation
+from postproc.compensation.eligibility.reasons import Reasons
+from postproc.compensation.options import Options
 from postproc.compensation.solver.payload import payload_of
 from postproc.compensation.solver.targets import targets_from_visits, with_tracks
 from postproc.language.language import Start
@@ -100,8 +100,8 @@ class PlannedProgram:
         shift: From where the controller takes every target to be to where it is, as
             far as a frame was taught with the arm's error in it, (n, 3) [m].
         shift_variance: Of it, (n, 3) [m^2].
-        doubtful: Why what comes from these targets is doubtful (see `eligibility`),
-            (n,); 0 where it is not.
+        doubtful: Why what comes from these targets is doubtful, (n,); 0 where it is
+            not (see `configuration_flags`).
     """
 
     targets: Targets
@@ -223,7 +223,7 @@ def plan_visits(
         timed: As in `plan`.
         begin: Where the arm stands at the first visit, if that is known beforehand.
         lead: What is known of the first arrivals, see `direction.arrivals`.
-        doubtful: Why what comes from there is doubtful (see `eligibility`).
+        doubtful: Why what comes from there is doubtful (see `configuration_flags`).
     """
     targets, reasons = targets_from_visits(visits, cell)
     wrist = np.deg2rad(cell.limits.wrist_deg)

@@ -20,11 +20,11 @@ from postproc.arrays import (
     any_in_rows,
     isin_sorted,
 )
+from postproc.compensation.eligibility.configuration_flags import find_overruled
 from postproc.compensation.outcome import Decisions, find_judged
 from postproc.compensation.program import ParsedProgram, PlannedProgram
 from postproc.compensation.solver.decisions import NONE
 from postproc.compensation.solver.dependants import with_what_moves_along
-from postproc.compensation.solver.eligibility import find_overruled
 from postproc.compensation.solver.expected_error import ErrorLaws, LengthLaw
 from postproc.compensation.solver.iterate import Converged
 from postproc.diagnostics import NO_REASON

@@ -15,10 +15,9 @@ import numpy as np
 
 from postproc import _native
 from postproc.arrays import Bools, Floats, Indices, Interned, Ints, data_frame
-from postproc.compensation.outcome import (
-    LEFT_ALONE,
+from postproc.compensation.outcome import LEFT_ALONE, Status
+from postproc.compensation.output.line_outcomes import (
     LineOutcomes,
-    Status,
     read_arrivals,
 )
 from postproc.compensation.scale.workers import in_background

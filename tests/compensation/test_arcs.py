@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.compensate import compensate
+from postproc.compensation.eligibility.configuration_flags import STRANDED
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.scale.windowing import cut_points
-from postproc.compensation.solver.eligibility import STRANDED
 
 START = (300.0, 100.0, 200.0)
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.outcome import BOTH, LineOutcomes, Status, tell_arrivals
+from postproc.compensation.outcome import Status
+from postproc.compensation.output.line_outcomes import BOTH, LineOutcomes, tell_arrivals
 from tests.report.html.builders import FIRST_LINE, decisions_of, visits_of
 
 

@@ -28,10 +28,10 @@ from postproc.batch.plan import Task, Unit, make_plan
 from postproc.batch.tree import scan
 from postproc.batch.workers import outcomes_of
 from postproc.calibration.fit import fit
+from postproc.compensation.eligibility.unchanged import HOLDS_NONE
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
-from postproc.compensation.solver.unchanged import HOLDS_NONE
 from postproc.exceptions import PostprocError
 from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED

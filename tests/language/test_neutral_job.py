@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
+from postproc.compensation.eligibility.configuration_flags import STRANDED
 from postproc.compensation.program import plan_visits, read_program
-from postproc.compensation.solver.eligibility import STRANDED
 from postproc.report.simulation import setup_of
 from postproc.simulation import virtual_arm
 from postproc.simulation.program import land

@@ -10,7 +10,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.compensation.outcome import LineOutcomes, Status
+from postproc.compensation.outcome import Status
+from postproc.compensation.output.line_outcomes import LineOutcomes
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.report.diff import (
     Difference,

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.compensation.outcome import directions_of_record
+from postproc.compensation.output.line_outcomes import directions_of_record
 from postproc.compensation.output.sidecar import Sidecar
 from postproc.compensation.program import read_program
 from postproc.compensation.solver.payload import payload_of

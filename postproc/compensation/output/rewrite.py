@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc import __version__
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.eligibility.guards import limit_violations
 from postproc.compensation.output.equivalence import equivalent
 from postproc.compensation.output.sidecar import (
     FileRecord,
@@ -18,7 +19,6 @@ from postproc.compensation.output.sidecar import (
 )
 from postproc.compensation.program import ParsedProgram
 from postproc.compensation.scale.workers import in_background
-from postproc.compensation.solver.guards import limit_violations
 from postproc.compensation.solver.shifts import shift_values
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of

@@ -1,1 +1,1 @@
-"""What every target is corrected by, and which targets keep their values."""
+"""What every target is corrected by: inverse model, rounds, agreement, decisions."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.solver.eligibility import Reasons
+from postproc.compensation.eligibility.reasons import Reasons
 from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Meaning, Visits
 from postproc.motion.path import circles

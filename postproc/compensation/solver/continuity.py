@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.eligibility.reasons import Reasons
 from postproc.compensation.solver.arc_angles import ArcAngles
-from postproc.compensation.solver.eligibility import Reasons
 from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Visits
 from postproc.robot.arm import Arm

@@ -8,6 +8,28 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.eligibility.arcs import STRAYS
+from postproc.compensation.eligibility.flag_borders import (
+    joints_written,
+    poses_with_signs,
+)
+from postproc.compensation.eligibility.guards import (
+    guard_motion,
+    guard_size,
+    guard_solutions,
+    guard_turn,
+)
+from postproc.compensation.eligibility.reasons import Reasons
+from postproc.compensation.eligibility.unchanged import (
+    EXPORTED,
+    NOT_WRITTEN,
+    SEVERAL_MOVES,
+    by_one_move,
+    mark_disagreement,
+    mark_unchanged,
+    may_clone_exported,
+    without_target,
+)
 from postproc.compensation.options import Job
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import ParsedProgram, PlannedProgram
@@ -24,14 +46,6 @@ from postproc.compensation.solver.dependants import (
     move_dependants,
     would_worsen,
 )
-from postproc.compensation.solver.eligibility import STRAYS, Reasons
-from postproc.compensation.solver.flag_borders import joints_written, poses_with_signs
-from postproc.compensation.solver.guards import (
-    guard_motion,
-    guard_size,
-    guard_solutions,
-    guard_turn,
-)
 from postproc.compensation.solver.inverse_model import (
     Commands,
     angles_astray,
@@ -42,16 +56,6 @@ from postproc.compensation.solver.inverse_model import (
     turns_in_file,
 )
 from postproc.compensation.solver.shifts import absorb, own_shifts, shift_values
-from postproc.compensation.solver.unchanged import (
-    EXPORTED,
-    NOT_WRITTEN,
-    SEVERAL_MOVES,
-    by_one_move,
-    mark_disagreement,
-    mark_unchanged,
-    may_clone_exported,
-    without_target,
-)
 from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Meaning, Visits
 from postproc.motion.deviation import JointDeviation

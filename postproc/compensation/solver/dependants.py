@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Interned, Ints, any_in_rows
+from postproc.compensation.eligibility.arcs import find_strayed
+from postproc.compensation.eligibility.unchanged import find_taught
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import PlannedProgram
 from postproc.compensation.solver.agreement import Agreement
-from postproc.compensation.solver.eligibility import find_strayed
 from postproc.compensation.solver.shifts import shift_values
 from postproc.compensation.solver.targets import move_targets
-from postproc.compensation.solver.unchanged import find_taught
 from postproc.language.visits import Meaning, Visits
 from postproc.motion.replan import IS_STEP
 from postproc.motion.targets import TargetKind

@@ -19,6 +19,8 @@ from postproc.arrays import (
     spans,
     take_rows,
 )
+from postproc.compensation.eligibility.flag_borders import turn_from_borders
+from postproc.compensation.eligibility.guards import limit_violations
 from postproc.compensation.options import Clock, Job
 from postproc.compensation.output.rewrite import WrittenNumbers, read_back
 from postproc.compensation.program import ParsedProgram, PlannedProgram
@@ -33,8 +35,6 @@ from postproc.compensation.solver.arc_angles import ArcAngles
 from postproc.compensation.solver.arc_turns import ArcTurns
 from postproc.compensation.solver.decisions import Beforehand, Proposal, Round
 from postproc.compensation.solver.dependants import with_origins
-from postproc.compensation.solver.flag_borders import turn_from_borders
-from postproc.compensation.solver.guards import limit_violations
 from postproc.compensation.solver.inverse_model import (
     Commands,
     foresee,

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.eligibility.reasons import Reasons
 from postproc.compensation.solver.arc_angles import (
     ArcAngles,
     find_past_start,
     place_ends,
 )
 from postproc.compensation.solver.arc_turns import ArcTurns, turn_between
-from postproc.compensation.solver.eligibility import Reasons
 from postproc.diagnostics import Code, Reason
 from postproc.language.visits import (
     Blend,

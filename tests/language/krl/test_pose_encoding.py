@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
+from postproc.compensation.eligibility.flag_borders import turns_moving
 from postproc.compensation.outcome import Status
-from postproc.compensation.solver.flag_borders import turns_moving
 from postproc.diagnostics import Code
 from postproc.language.krl.pose_encoding import BORDER, KRL_DIALECT
 from postproc.language.visits import Meaning

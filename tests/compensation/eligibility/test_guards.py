@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.solver.eligibility import Reasons
-from postproc.compensation.solver.guards import guard_size, guard_solutions
+from postproc.compensation.eligibility.guards import guard_size, guard_solutions
+from postproc.compensation.eligibility.reasons import Reasons
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import LimitSection
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats
-from postproc.compensation.solver.eligibility import Reasons
+from postproc.compensation.eligibility.reasons import Reasons
 from postproc.diagnostics import Code, Reason
 from postproc.motion.deviation import JointDeviation
 from postproc.robot.arm import Arm

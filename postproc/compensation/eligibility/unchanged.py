@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from postproc.arrays import Bools, Ints
+from postproc.compensation.eligibility.reasons import Reasons
 from postproc.compensation.options import Options
 from postproc.compensation.solver.agreement import Agreement
-from postproc.compensation.solver.eligibility import Reasons
 from postproc.compensation.solver.shifts import own_shifts
 from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Meaning, Visits

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.compensation.eligibility.configuration_flags import find_overruled
 from postproc.compensation.findings.findings import list_overruled_strings
 from postproc.compensation.program import (
     ParsedProgram,
@@ -14,7 +15,6 @@ from postproc.compensation.program import (
     plan_visits,
     read_program,
 )
-from postproc.compensation.solver.eligibility import find_overruled
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.compensation.eligibility.configuration_flags import STOPPED, STRANDED
 from postproc.compensation.program import PlannedProgram, plan_visits, read_program
-from postproc.compensation.solver.eligibility import STOPPED, STRANDED
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 

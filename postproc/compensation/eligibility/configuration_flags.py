@@ -1,4 +1,4 @@
-"""Which targets must stay, whatever the model says: flags, orientation, arcs."""
+"""How far configuration flags count."""
 
 from __future__ import annotations
 
@@ -6,83 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Interned, Ints
-from postproc.diagnostics import NO_REASON, Code, Reason
-from postproc.language.pose_encoding import Terms
-from postproc.language.visits import OrientationLaw, Switch, Visits
+from postproc.arrays import Bools, Ints
+from postproc.compensation.eligibility.reasons import Reasons, mark_rows
+from postproc.diagnostics import Code, Reason
+from postproc.language.visits import Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
-from postproc.motion.path import NEAR, arcs_of
 from postproc.motion.planner import Plan
 from postproc.motion.targets import STRANDS, TargetKind, Targets
 from postproc.robot.arm import Arm
-from postproc.robot.pose import MM, inverse, rotation_vector
 from postproc.robot.trajectory import Motion
 
-# Why something did not happen, for many visits at once.
-
-
-class Reasons:
-    """The first reason given for each of n visits.
-
-    >>> reasons = Reasons(3)
-    >>> far = Reason(Code.OUT_OF_REACH, "out of reach")
-    >>> wrist = Reason(Code.SINGULAR_WRIST, "at the wrist singularity")
-    >>> reasons.mark(np.array([True, False, False]), far)
-    >>> reasons.mark(np.array([True, True, False]), wrist)
-    >>> [str(reasons[k]) for k in range(3)]
-    ['out of reach', 'at the wrist singularity', '']
-    """
-
-    def __init__(self, n: int) -> None:
-        """Start with no reason for n visits."""
-        self.index: Ints = np.zeros(n, dtype=np.int64)
-        self._found = Interned([NO_REASON])
-
-    def copy(self) -> Reasons:
-        """Return the same, to go on from."""
-        other = Reasons(0)
-        other.index, other._found = np.array(self.index), Interned(self._found)
-        return other
-
-    @property
-    def all(self) -> tuple[Reason, ...]:
-        """Return the reasons; index 0 is `NO_REASON`."""
-        return tuple(self._found)
-
-    @property
-    def none(self) -> Bools:
-        """Tell which visits have no reason yet, (n,)."""
-        return np.asarray(self.index == 0)
-
-    def mark(self, rows: Bools, reason: Reason) -> None:
-        """Give visits a reason, unless they have one already.
-
-        Args:
-            rows: Which visits, (n,).
-            reason: The reason.
-        """
-        if rows.any() and (rows := rows & self.none).any():
-            self.index[rows] = self._found[reason]
-
-    def mark_visits(self, visits: Ints, reason: Reason) -> None:
-        """Give a few visits a reason, by number, unless they have one already."""
-        free = visits[self.index[visits] == 0]
-        if len(free):
-            self.index[free] = self._found[reason]
-
-    def adopt(self, index: Ints, reasons: tuple[Reason, ...]) -> None:
-        """Take over reasons found elsewhere, (n,) indices into them."""
-        for number in np.flatnonzero(np.bincount(index)).tolist():
-            if reasons[number]:
-                self.mark(index == number, reasons[number])
-
-    def __getitem__(self, visit: int) -> Reason:
-        """Return the reason of one visit."""
-        return self.all[int(self.index[visit])]
-
-
-# How far configuration flags count.
-#
 # On a line or an arc the path decides where the arm arrives, and the string is checked
 # (likely): where it is and says otherwise, the controller stops. A JOINT move takes
 # branch and turns from the string; whether it still does where the checks are off is
@@ -266,7 +199,7 @@ def _mark_either_way(
     if branch.any():
         edge, source = _edges(visits, plan, branch)
         other = arm.branch(plan.q[source]) != targets.slot[edge]
-        branch &= _mark_rows(len(visits), edge[other])
+        branch &= mark_rows(len(visits), edge[other])
     if turn.any():
         turn &= _other_turn(visits, targets, plan, arm)
     terms, code = visits.dialect.terms, Code.CONFIGURATION_UNKNOWN
@@ -299,7 +232,7 @@ def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools
     turned = nearest_turns(plan.q[edge], plan.q[source])
     allowed = (turned >= arm.lower) & (turned <= arm.upper)
     other = allowed & (np.abs(turned - plan.q[edge]) > OTHER_TURN)
-    far = _mark_rows(len(visits), edge[other.any(axis=1)])
+    far = mark_rows(len(visits), edge[other.any(axis=1)])
     return np.where(targets.nearest_turn, on_other_turns(plan.q, targets.turns), far)
 
 
@@ -309,13 +242,6 @@ def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:
     known = rows[edge] & (visits.graph.pred >= 0)
     known &= ~np.isnan(plan.q[visits.graph.pred, 0])
     return edge[known], visits.graph.pred[known]
-
-
-def _mark_rows(n: int, rows: Ints) -> Bools:
-    """Tell which of n rows are listed, (n,)."""
-    found = np.zeros(n, dtype=bool)
-    found[rows] = True
-    return found
 
 
 def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Bools]:
@@ -338,153 +264,3 @@ def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Boo
                 waiting.append(w)
             reached[w] = True
     return reached & ~doubtful, doubtful | (reached & ~sure)
-
-
-# How the tool turns on its way: $ORNT_TYPE, as far as it matters.
-#
-# Lines and arcs are planned with the tool turning about one fixed axis (RS_WORLD),
-# lines also with the wrist axes in proportion (WRIST_JNT): on arcs that is not planned,
-# so that the sides from which they arrive are not known. EUL_WORLD and RPY_WORLD let
-# three angles run in proportion instead (likely), RS_TRAJ takes the tool along an arc.
-# The ends are the same, the way between is not: where it may be off by more than a
-# joint's play, a joint may arrive from another side, and the target is left alone.
-# On arcs on which the tool turns little the targets are corrected, and joints that may
-# arrive from another side are not known (`motion.spline_moves`).
-#
-# Euler angles in proportion turn the tool at w = a' z + e' y(a) + r' z(a, e), and |w'|
-# <= turn^2 / sin(e), so that it is off by at most turn^2 / (8 sin(e)), and by no more
-# than the turn. Where e is 0 or 180 deg at both ends they turn it about the z axis, as
-# RS_WORLD does.
-
-PLAY = np.deg2rad(0.01)  # [rad] what a joint may be off without another side
-SMALL_TURN = np.deg2rad(0.5)  # of an arc: joints that this may turn back are not sure
-LEAST = 3e-4  # sine below which e is 0 or 180 deg
-
-
-def mark_orientation_interpolation(
-    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
-) -> None:
-    """Leave alone where another way of turning may matter.
-
-    Args:
-        visits: What the program says.
-        targets: Its n moves.
-        plan: Where they lead.
-        reasons: Why visits must not be compensated; more are added.
-    """
-    kind, cartesian = visits.motion.orientation_law, targets.move != Motion.JOINT
-    law, terms = OrientationLaw, visits.dialect.terms
-    unknown = Reason(Code.ORIENTATION_LAW, terms.law_unknown)
-    reasons.mark(cartesian & (kind == law.UNKNOWN), unknown)
-    arc = targets.move == Motion.CIRCULAR
-    reasons.mark(
-        arc & targets.wrist_joint, _name_law(terms, terms.arc, law.WRIST_JOINTS)
-    )
-    for rows, text, said in (
-        (targets.along, terms.arc, law.ALONG_PATH),
-        (cartesian & (kind == law.EULER_ANGLES), terms.angles, law.EULER_ANGLES),
-        (cartesian & (kind == law.ROLL_PITCH_YAW), terms.angles, law.ROLL_PITCH_YAW),
-    ):
-        if rows.any():
-            off = _may_be_off(visits, targets, plan, rows)
-            reasons.mark(off, _name_law(terms, text, said))
-
-
-def _name_law(terms: Terms, text: str, law: OrientationLaw) -> Reason:
-    """Name a law in a reason, where the language has a name for it."""
-    name = terms.laws[law] if law < len(terms.laws) else law.name
-    return Reason(Code.ORIENTATION_LAW, text.format(name))
-
-
-def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bools:
-    """Tell which of some moves may turn the tool otherwise than planned, (n,)."""
-    edge = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
-    source = visits.graph.pred
-    known = rows[edge] & (source >= 0)
-    known &= ~np.isnan(plan.tcp[source, 0, 0] + plan.tcp[edge, 0, 0])
-    edge, source = edge[known], source[known]
-    found = np.zeros(len(visits), dtype=bool)
-    if len(edge) == 0:
-        return found
-    to_flange = inverse(targets.tool[source])
-    begin = (plan.tcp[source] @ to_flange @ targets.tool[edge])[:, :3, :3]
-    end = plan.tcp[edge][:, :3, :3]
-    turn = np.linalg.norm(rotation_vector(np.swapaxes(begin, 1, 2) @ end), axis=1)
-    kind = visits.motion.orientation_law[edge]
-    world = visits.frame.poses[visits.frame.base[edge]][:, :3, :3]
-    sine = np.minimum(_sine(world @ begin, kind), _sine(world @ end, kind))
-    off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
-    both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))
-    same = (both < LEAST) & (kind == OrientationLaw.EULER_ANGLES)
-    along = targets.along[edge]
-    off = np.where(along, turn, np.where(same, 0.0, off))
-    found[edge[off > np.where(along, SMALL_TURN, PLAY)]] = True
-    return found
-
-
-def _sine(R: Floats, kind: Ints) -> Floats:
-    """Tell how far from where three angles stop telling orientations apart, (k,).
-
-    Sine of the Euler angle e, or cosine of the pitch, of orientations (k, 3, 3).
-    """
-    euler, pitch = np.hypot(R[:, 0, 2], R[:, 1, 2]), np.hypot(R[:, 0, 0], R[:, 1, 0])
-    return np.asarray(np.where(kind == OrientationLaw.ROLL_PITCH_YAW, pitch, euler))
-
-
-# Arcs that their points hardly determine are not corrected.
-#
-# A correction moves start, VIA and end of an arc by slightly different amounts. That
-# does no harm where they lie well apart; where they do not, the arm would run along
-# another circle than the program says, or along none.
-
-CURE = "move VIA, or use LINEAR"
-LINE = Reason(
-    Code.ARC_UNDETERMINED,
-    f"the three points of the arc that begins here lie on one line: {CURE}",
-)
-TOO_NEAR = Reason(
-    Code.ARC_UNDETERMINED,
-    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that they "
-    f"do not determine its circle: {CURE}",
-)
-STRAYS = Reason(
-    Code.ARC_DISTORTED,
-    "the corrected points of the arc would make a very different circle: move VIA "
-    "to its middle, or divide it",
-)
-
-
-def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
-    """Leave the points of arcs alone that make no sure circle, the start included.
-
-    Args:
-        targets: The n moves of a program.
-        plan: Where they lead.
-        reasons: Why visits must not be compensated; more are added.
-    """
-    arcs = arcs_of(targets, plan.tcp, plan.aside)
-    near = arcs.too_near
-    for rows, reason in ((near, TOO_NEAR), (arcs.on_a_line & ~near, LINE)):
-        reasons.mark(_mark_rows(len(targets), arcs.visit[rows]), reason)
-
-
-def find_strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
-    """Tell which targets move so that an arc at them becomes quite another one, (n,).
-
-    It does where the path between its points moves more than twice as far as they do:
-    it would then miss by more than it does without any correction.
-
-    Args:
-        targets: The n moves of a program.
-        plan: Where they lead.
-        shift: What the targets move by, (n, 3) [m], base frame.
-        step: How much farther than its points the path may move in any case [m].
-    """
-    arcs = arcs_of(targets, plan.tcp, plan.aside)
-    if len(arcs) == 0:
-        return np.zeros(len(targets), dtype=bool)
-    own = shift[arcs.visit]
-    size = np.linalg.norm(own, axis=2).max(axis=1)
-    with np.errstate(invalid="ignore"):
-        far = (size > 0.0) & (arcs.strays(own) > np.maximum(size, step))
-    return _mark_rows(len(targets), arcs.visit[far])

@@ -1,0 +1,1 @@
+"""Which targets must stay, and why: flags, orientation, arcs, guards."""
