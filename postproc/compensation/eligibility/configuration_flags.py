@@ -20,6 +20,7 @@ from postproc.robot.trajectory import Motion
 # (likely): where it is and says otherwise, the controller stops. A JOINT move takes
 # branch and turns from the string; whether it still does where the checks are off is
 # not sure, so that it is compensated only where both readings lead to the same place.
+# Flags are those of the written targets, which the arm may round (`Plan.exact`).
 
 CNFG, TURN, MULTI = 0, 1, 2  # columns of `Visits.care`
 SAID = {
@@ -69,8 +70,8 @@ def find_overruled(targets: Targets, plan: Plan) -> Overruled:
     """Compare where Cartesian paths arrive with their configuration strings."""
     path = plan.overruled & ~targets.via
     return Overruled(
-        path & (plan.slot != targets.slot),
-        path & on_other_turns(plan.q, targets.turns) & ~targets.nearest_turn,
+        path & (plan.exact.slot != targets.slot),
+        path & on_other_turns(plan.exact.q, targets.turns) & ~targets.nearest_turn,
     )
 
 
@@ -180,9 +181,10 @@ def _find_misses(visits: Visits, targets: Targets, plan: Plan) -> Bools:
     """Find checked flags, finer than branch and turn, that are not the plan's, (n,)."""
     off = np.zeros(len(visits), dtype=bool)
     rows = np.flatnonzero((targets.kind == TargetKind.POSE) & (targets.slot >= 0))
-    missed = visits.dialect.misses(visits.target.values[rows], plan.q[rows])
+    q = plan.exact.q[rows]
+    missed = visits.dialect.misses(visits.target.values[rows], q)
     if missed is not None:
-        off[rows] = missed & ~np.isnan(plan.q[rows, 0])
+        off[rows] = missed & ~np.isnan(q[:, 0])
     return np.asarray(off & (visits.motion.care[:, CNFG] != Switch.OFF))
 
 
@@ -191,14 +193,14 @@ def _mark_either_way(
 ) -> Bools:
     """Leave moves alone that two readings of their string lead elsewhere."""
     placed = (targets.kind == TargetKind.POSE) & (targets.slot >= 0)
-    placed &= ~np.isnan(plan.q[:, 0])
+    placed &= ~np.isnan(plan.exact.q[:, 0])
     joint = placed & (targets.move == Motion.JOINT)
     wrist = placed & ~joint & targets.wrist_joint
     branch = wrist | (joint & _is_doubtful(visits.motion.care[:, CNFG]))
     turn = wrist | (joint & _turns_doubted(visits, targets))
     if branch.any():
         edge, source = _edges(visits, plan, branch)
-        other = arm.branch(plan.q[source]) != targets.slot[edge]
+        other = arm.branch(plan.exact.q[source]) != targets.slot[edge]
         branch &= mark_rows(len(visits), edge[other])
     if turn.any():
         turn &= _other_turn(visits, targets, plan, arm)
@@ -229,18 +231,20 @@ def _turns_doubted(visits: Visits, targets: Targets) -> Bools:
 def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools:
     """Tell where written turns and the nearest ones differ, (n,)."""
     edge, source = _edges(visits, plan, np.ones(len(visits), dtype=bool))
-    turned = nearest_turns(plan.q[edge], plan.q[source])
+    turned = nearest_turns(plan.exact.q[edge], plan.exact.q[source])
     allowed = (turned >= arm.lower) & (turned <= arm.upper)
-    other = allowed & (np.abs(turned - plan.q[edge]) > OTHER_TURN)
+    other = allowed & (np.abs(turned - plan.exact.q[edge]) > OTHER_TURN)
     far = mark_rows(len(visits), edge[other.any(axis=1)])
-    return np.where(targets.nearest_turn, on_other_turns(plan.q, targets.turns), far)
+    return np.where(
+        targets.nearest_turn, on_other_turns(plan.exact.q, targets.turns), far
+    )
 
 
 def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:
     """List the known origins of some visits: visits (e,) and where from (e,)."""
     edge = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
     known = rows[edge] & (visits.graph.pred >= 0)
-    known &= ~np.isnan(plan.q[visits.graph.pred, 0])
+    known &= ~np.isnan(plan.exact.q[visits.graph.pred, 0])
     return edge[known], visits.graph.pred[known]
 
 

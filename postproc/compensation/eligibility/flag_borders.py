@@ -56,19 +56,17 @@ def joints_written(
     Returns:
         Joints of the commands, and of the source, (k, 6) [rad].
     """
-    plan, q, before = planned.plan, solved.q[rows], planned.plan.q[rows]
+    plan, q, before = planned.plan, solved.q[rows], planned.plan.exact.q[rows]
     known = np.isfinite(q).all(axis=1) & np.isfinite(before).all(axis=1)
     off = np.flatnonzero(known & any_in_rows(plan.aside[rows] != 0.0))
     if len(off) == 0:
         return q, before
-    some, pose = rows[off], planned.targets.tcp[rows[off]]
-    from_tcp = inverse(take_rows(plan.tool, some))
-    new = np.array(pose)
-    new[:, :3, :3] = rotation_from_vector(solved.turn[some]) @ pose[:, :3, :3]
+    some, near = rows[off], before[off]
+    new = np.array(planned.targets.tcp[some])
+    new[:, :3, :3] = rotation_from_vector(solved.turn[some]) @ new[:, :3, :3]
     new[:, :3, 3] = solved.command[some, :3, 3] - aside[some]
-    for out, written in ((q, new), (before, pose)):
-        near = out[off]
-        out[off] = arm.nearest(written @ from_tcp, near, arm.branch(near))
+    flange = new @ inverse(take_rows(plan.tool, some))
+    q[off] = arm.nearest(flange, near, arm.branch(near))
     return q, before
 
 

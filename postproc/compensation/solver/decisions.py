@@ -252,9 +252,10 @@ class Round:
             visits.target.values,
             found.decisions.corrected,
         )
+        near = self.planned.plan.exact.q
         before, q = (
             solve_written(visits, arm, rows, numbers[rows], near[rows])
-            for numbers, near in ((given, self.planned.plan.q), (new, self.solved.q))
+            for numbers in (given, new)
         )
         out[rows] = visits.dialect.near_border(given[rows], q, before, rounded=True)
         return out

@@ -340,7 +340,8 @@ def new_numbers(
 
     P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
     it where it should. An orientation that does not change keeps its written numbers.
-    Flags that small moves decide are those of the numbers as they are rounded.
+    Flags that small moves decide are those of the numbers as they are rounded; they
+    are of the target, which a blend passes with other joints.
     """
     numbers = np.array(visits.target.values)
     joints = visits.target.meaning == Meaning.JOINTS
@@ -359,11 +360,12 @@ def new_numbers(
         by = rotation_from_vector(turns_in_file(visits, solved)[rows])
         numbers[rows] = dialect.rotate(numbers[rows], by)
     if dialect.flag_joints:
-        q = np.array(solved.q[poses])
+        before = plan.exact.q[poses]
+        q = solved.q[poses] + (before - plan.q[poses])
         close = np.flatnonzero(dialect.rounding_decides(q))
         rows = poses[close]
         q[close] = solve_written(visits, arm, rows, numbers[rows], q[close])
-        numbers[poses] = dialect.rewrite_flags(numbers[poses], q, plan.q[poses])
+        numbers[poses] = dialect.rewrite_flags(numbers[poses], q, before)
     return numbers
 
 
