@@ -234,7 +234,10 @@ def plan_visits(
         planned = plan(cell.arm, targets, wrist, timed, begin, lead)
     reasons.adopt(planned.reason, planned.reasons)
     begun = bool(doubtful & CONTRADICTED)
-    on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, begun)
+    seeded = len(begin) > 0
+    on = mark_configuration_flags(
+        visits, targets, planned, cell.arm, reasons, begun, seeded
+    )
     behind = mark_stranded(visits, targets, planned, reasons, doubtful)
     mark_orientation_interpolation(visits, targets, planned, reasons)
     mark_arcs(targets, planned, reasons)

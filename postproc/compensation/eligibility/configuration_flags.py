@@ -33,6 +33,12 @@ AFTER = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
     "the move before it ends with an uncertain branch or turn",
 )
+FROM_ANYWHERE = Reason(
+    Code.CONFIGURATION_UNKNOWN,
+    "whether its configuration flags count is not sure here, and the place before, "
+    "whose configuration the arm keeps otherwise, is not known: add a move by joint "
+    "angles before it",
+)
 STRANDED = Reason(
     Code.UNKNOWN_POSITION_BEFORE,
     "the arm cannot reach the previous target as it is written, so that the approach "
@@ -96,6 +102,7 @@ def mark_configuration_flags(
     arm: Arm,
     reasons: Reasons,
     begun: bool = False,
+    seeded: bool = False,
 ) -> Bools:
     """Leave alone what configuration strings make doubtful.
 
@@ -106,6 +113,7 @@ def mark_configuration_flags(
         arm: The arm.
         reasons: Why visits must not be compensated; more are added.
         begun: The first visit is a place that makes what comes from there doubtful.
+        seeded: It is a place that is known beforehand.
 
     Returns:
         Whether what comes from a visit is doubtful, (n,).
@@ -114,6 +122,7 @@ def mark_configuration_flags(
     finer = Reason(Code.CONFIGURATION_CONTRADICTED, visits.dialect.terms.branch_stops)
     reasons.mark(_find_misses(visits, targets, plan), finer)
     doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
+    doubtful |= _mark_from_anywhere(visits, targets, plan, reasons, seeded)
     doubtful[:1] |= begun
     if not doubtful.any():
         return doubtful
@@ -216,6 +225,20 @@ def _mark_either_way(
     return np.asarray(branch | turn)
 
 
+def _mark_from_anywhere(
+    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons, seeded: bool
+) -> Bools:
+    """Leave moves alone whose string need not count, from a place that is not known."""
+    rows = (targets.kind == TargetKind.POSE) & (targets.slot >= 0)
+    rows &= _is_doubtful(visits.motion.care[:, CNFG])
+    edge, pred, known = _list_edges(visits, plan)
+    found = rows & mark_rows(len(visits), edge[~known])
+    if seeded:  # from where it is known, and -1 speaks of sides alone
+        found &= ~mark_rows(len(visits), edge[pred == 0])
+    reasons.mark(found, FROM_ANYWHERE)
+    return np.asarray(found)
+
+
 def _is_doubtful(switch: Ints) -> Bools:
     return np.asarray((switch == Switch.OFF) | (switch == Switch.UNKNOWN))
 
@@ -242,10 +265,17 @@ def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools
 
 def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:
     """List the known origins of some visits: visits (e,) and where from (e,)."""
+    edge, pred, known = _list_edges(visits, plan)
+    known = known & rows[edge]
+    return edge[known], pred[known]
+
+
+def _list_edges(visits: Visits, plan: Plan) -> tuple[Ints, Ints, Bools]:
+    """List where visits come from: visits, where from, and if that is known, (e,)."""
     edge = np.repeat(np.arange(len(visits)), np.diff(visits.graph.pred_start))
-    known = rows[edge] & (visits.graph.pred >= 0)
-    known &= ~np.isnan(plan.exact.q[visits.graph.pred, 0])
-    return edge[known], visits.graph.pred[known]
+    pred = visits.graph.pred
+    known = (pred >= 0) & ~np.isnan(plan.exact.q[np.maximum(pred, 0), 0])
+    return edge, pred, known
 
 
 def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Bools]:

@@ -7,7 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.compensation.eligibility.configuration_flags import find_overruled
+from postproc.compensation.eligibility.configuration_flags import (
+    AFTER,
+    FROM_ANYWHERE,
+    find_overruled,
+)
 from postproc.compensation.findings.findings import list_overruled_strings
 from postproc.compensation.program import (
     ParsedProgram,
@@ -158,10 +162,26 @@ def test_wrist_axes_on_a_line_keep_branch_and_turn(
     assert ("WRIST_JNT" in found.reasons[1].text) == (config != "T1:0 T2:0")
 
 
-def test_an_unknown_start_goes_by_the_string(cell: Cell) -> None:
+def test_an_unknown_start_goes_by_the_string_where_that_counts(cell: Cell) -> None:
     move = f"MOVE JOINT TO {pos(cell, THERE, 'T1:0 T2:1')}"
-    _, found = planned(cell, "$CNFG_CARE := FALSE", "$TURN_CARE := FALSE", move)
+    _, found = planned(cell, move)
     assert found.reasons[0].text == ""
     np.testing.assert_allclose(
         np.rad2deg(found.plan.q[0]), [*THERE[:5], THERE[5] + 360], atol=1e-3
     )
+
+
+@pytest.mark.parametrize("kind", ["JOINT", "LINEAR"])
+@pytest.mark.parametrize("switch", ["FALSE", "$DIN[1]"])
+def test_the_string_does_not_tell_where_an_unknown_start_leads_if_it_need_not_count(
+    cell: Cell, kind: str, switch: str
+) -> None:
+    """The arm keeps the branch that it is on, which nobody knows."""
+    care = f"$CNFG_CARE := {switch}"
+    move = f"MOVE {kind} TO {pos(cell, THERE, 'T1:0 T2:0')}"
+    _, found = planned(cell, care, move, move, START, move)
+    assert found.reasons[0] == FROM_ANYWHERE
+    assert found.reasons[1] == AFTER
+    assert not found.reasons[3]
+    _, found = planned(cell, START, care, move)
+    assert not found.reasons[1]
