@@ -238,6 +238,28 @@ def test_wrong_arm_file_names_the_place(tmp_path, arm, old, new, said):
         load_arm(_write_arm(tmp_path, arm, old, new))
 
 
+def test_an_arm_whose_elbow_has_no_offset_is_read(tmp_path):
+    """Such as an IRB 140: with joint 3 at -90 deg its elbow is stretched."""
+    from postproc.robot.arm_file import ARMS
+
+    text = (ARMS / "irb6640-185-2.8.toml").read_text()
+    for old, new in (
+        ("a2_mm = -200.0", "a2_mm = 0.0"),
+        ("1075.0, 200.0", "1075.0, 0.0"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "arm.toml"
+    path.write_text(text)
+    straight = load_arm(path)
+    q = np.deg2rad([[10.0, 20.0, -60.0, 30.0, 40.0, 50.0]])
+    found = straight.nearest(straight.flange(q), q)
+    np.testing.assert_allclose(found, q, atol=1e-9)
+    path.write_text(text.replace("c3_mm = 1392.0", "c3_mm = 1392.1"))
+    with pytest.raises(ArmError, match=r"\$\.opw"):
+        load_arm(path)
+
+
 def test_a_gear_ratio_of_0_is_not_known(tmp_path, arm):
     ratio = "gear_ratio = [121.0, -80.5, 0.0, 0.0, 0.0, 0.0]\n[links]"
     read = load_arm(_write_arm(tmp_path, arm, "[links]", ratio))
