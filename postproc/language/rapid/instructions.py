@@ -86,8 +86,8 @@ ANSWERS = frozenset(
 
 BUILT_IN_FUNCTIONS = NAMES["function"]
 
-STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval", "defaccframe"}
-"""Functions that do not move."""
+STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | NAMES["answering"]
+"""Functions that do not move; those that answer may change what they are given."""
 
 SYNCHRONOUS = ("movejsync", "movelsync", "movecsync")
 BY_NAME = "callbyvar"

@@ -157,6 +157,28 @@ def test_a_parameter_hides_what_the_controller_knows(name):
 
 
 @pytest.mark.parametrize(
+    ("call", "changes"),
+    [
+        ("n:=ReadNum(dev);", False),
+        ("n:=VectMagn(v);", False),
+        ("s:=ByteToStr(n\\Hex);", False),
+        ("IF SocketGetStatus(c)=SOCKET_CONNECTED n:=1;", False),
+        ('n:=UINumEntry(\\Header:="x");', False),
+        ("n:=UINumEntry(\\InitValue:=p.trans.x);", True),
+        ("ok:=TestAndSet(ok);", False),
+        ("n:=nobody(1);", None),
+    ],
+)
+def test_what_functions_of_the_controller_do(call, changes):
+    """They do not move; None: that is no function of the controller."""
+    point = f"VAR robtarget p:=[[1,2,3],[1,0,0,0],{END};"
+    more = f"VAR num n; VAR bool ok; VAR string s; VAR pos v; {point}"
+    first, second = reasons(task(call, L.format("p"), L.format("p1"), more=more))
+    assert bool(first) == (changes is not False)
+    assert bool(second) == (changes is None)
+
+
+@pytest.mark.parametrize(
     ("lines", "more"),
     [
         (['ok:=StrToVal("x",p);', L.format("p")], ""),
