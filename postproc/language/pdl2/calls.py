@@ -97,7 +97,7 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
     why = f"{name}, which is not followed, runs this move"
     nothing, reason = Nothing(why), Reason(Code.NEVER_REACHED, why)
     for row in range(body.first + 1, body.last):
-        statement = program.lines.statement(row)
+        statement = ast.action(program.lines.statement(row))
         if isinstance(statement, ast.Move):
             store = Store(lambda key: nothing, last=NOWHERE)
             store.forget_frames(why)
