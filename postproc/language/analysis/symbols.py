@@ -34,6 +34,7 @@ from postproc.language.analysis.values import (
     apply_function,
     apply_operator,
     is_written,
+    list_slots_in,
     number_in,
     put_together,
     spell_components,
@@ -315,6 +316,37 @@ class TaskSymbols(ABC, Generic[F]):
         lines = self.files[file].text.lines(row)
         return name in self.start.taught or not self.taught_lines[file].isdisjoint(
             lines
+        )
+
+    def holds_taught(
+        self, operand: ir.Operand | None, found: Value | None, here: Scope
+    ) -> bool:
+        """Return True if any data or number that a value is made from was taught.
+
+        Args:
+            operand: What holds the value.
+            found: The value.
+            here: Where it is taken.
+        """
+        held, names = self.find_held(operand, here), frozenset[str]()
+        names = names if operand is None else self.names_of(operand)
+        names = names if held is None else names | held.names
+        declared = (self.datum(name, here) for name in names)
+        rows = {(one[0], one[1].row) for one in declared if one is not None}
+        for slot in list_slots_in(found):
+            file = self.numbering.file_of(slot)
+            own = self.numbering.first[file]
+            rows.add((file, self.files[file].text.row_of(slot - own)))
+        listed = not names.isdisjoint(self.start.taught)
+        listed |= not rows.isdisjoint(self._listed_rows)
+        return listed or any(self.is_taught("", *one) for one in rows)
+
+    @cached_property
+    def _listed_rows(self) -> frozenset[tuple[int, int]]:
+        """Statements, by file and row, that declare what the cell says was taught."""
+        pairs = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        return frozenset(
+            (k, one.row) for k, one in pairs if one.name in self.start.taught
         )
 
     # What statements change and take.

@@ -168,10 +168,8 @@ class FrameReader:
         pose = pose_of(value)
         name = operand.name if isinstance(operand, ir.DataObject) else ""
         if pose:
-            found = self.task.datum(name, self.here) if name else None
-            at = (found[0], found[1].row) if found else (self.here.file, self.here.row)
-            known = found is not None or not name
-            return TaskFrame(pose, taught=known and self.task.is_taught(name, *at))
+            taught = self.task.holds_taught(operand, value, self.here)
+            return TaskFrame(pose, taught=taught)
         if name:
             return TaskFrame((), self._unknown(name.upper(), name))
         return no_frame("a frame is not written whole")

@@ -482,6 +482,30 @@ def test_frames_that_were_taught():
     assert frames(task(L.format("p1"), data="\n".join(lines))) == (True, False)
 
 
+SET_W2 = 'w2:=[FALSE,TRUE,"",[[0,0,5],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+COPIES = {
+    "whole": "w2:=w;",
+    "then changed": "w2:=w; w2.uframe.trans.x:=0;",
+    "in part": 'w2:=[FALSE,TRUE,"",w.uframe,[[0,0,0],[1,0,0,0]]];',
+    "a component": f"{SET_W2} w2.uframe:=w.uframe;",
+}
+
+
+@pytest.mark.parametrize("copy", COPIES.values(), ids=COPIES)
+@pytest.mark.parametrize("by_cell", [True, False])
+def test_a_frame_that_is_made_from_a_taught_one_was_taught(copy, by_cell):
+    lines = DATA.splitlines()
+    lines[2] += "" if by_cell else " ! TAUGHT"
+    data = "\n".join([*lines, "LOCAL VAR wobjdata w2;"])
+    start = Start(taught=frozenset({"w"} if by_cell else ()))
+    go = L.format("p1").replace(":=w;", ":=w2;")
+    found = task(copy, go, data=data, start=start)
+    v = found.visits
+    assert reasons(found) == [""] and v.frame.taught[v.frame.uframe[0]]
+    own = task(SET_W2, go, data=data, start=start).visits
+    assert not own.frame.taught[own.frame.uframe[0]]
+
+
 def test_measured_moves_carry_their_ids():
     arc = f"MoveC p2,[[7,8,9],[1,0,0,0],{END},v200,fine,t\\WObj:=w;"
     found = task(
