@@ -136,7 +136,7 @@ class FrameReader:
         if isinstance(held, TaskFrame) and self.task.is_global(table, self.here):
             return held
         found = self.task.datum(table, self.here, (number,))
-        if found is not None and self.task.is_steady(table, number):
+        if found is not None and self.task.is_steady(table, (number,)):
             pose = pose_of(self.task.entry(table, number, self.here))
             taught = self.task.is_taught(table, found[0], found[1].row)
             if pose:
