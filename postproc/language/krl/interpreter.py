@@ -224,15 +224,15 @@ class KrlMachine(TaskMachine):
             modes = modes.drop(name)
         return here.with_modes(modes)
 
-    def _modes(self, at: At) -> ModeReader:
-        return ModeReader(self.task, scope_at(at))
+    def _modes(self, at: At, here: Arrived) -> ModeReader:
+        return ModeReader(self.task, scope_at(at, here))
 
     def _assign(self, at: At, one: ir.Assignment, here: Arrived) -> Arrived:
         """Give a value to data, or change how moves are made."""
         name = one.target.name
         if name.startswith("$") and name not in PLANNED:
             here = _halt(here, True if name in HALTING else None)
-        modes = self._modes(at).assign(here.modes, one)
+        modes = self._modes(at, here).assign(here.modes, one)
         if modes is None:
             what = (
                 f"sets {name.upper()}: what that does to moves is not known. Take it "
@@ -253,7 +253,7 @@ class KrlMachine(TaskMachine):
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
                 here = _halt(here, None)  # outputs are switched, which may stop the arm
-            return here.with_modes(self._modes(at).bas(here.modes, one.arguments))
+            return here.with_modes(self._modes(at, here).bas(here.modes, one.arguments))
         if name == "pulse":
             return _halt(here, True)
         if name == "on_error_proceed":
