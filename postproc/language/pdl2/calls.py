@@ -306,12 +306,14 @@ def assign(here: Execution, statement: ir.Assignment, taught: bool) -> None:
             invalidate_key(here, key, points_of(other))
         return
     if name.startswith("$"):
+        taught = taught or here.takes_taught(new)
         _setting(here, reference, _value(here, new, taught), taught)
         return
     target = here.locate(reference)
     if target.exact and target.number >= 0:
         part = here.read_number(new)
         held = _position(here, name, target.key).with_component(target.number, part)
+        held = replace(held, taught=held.taught or here.takes_taught(new))
         here.store.write(target.key, set_owner(here, name, target.key, held))
         return
     if copy_parts(here, new, reference):

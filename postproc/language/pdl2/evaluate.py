@@ -251,7 +251,17 @@ class Execution:
             numbers=tuple(None if value != value else value for value in values),
             slots=tuple(part.slot for part in parts),
             along=frozenset(at for at, part in enumerate(parts) if part.along),
+            taught=any(map(self.takes_taught, items)),
         )
+
+    def takes_taught(self, expression: ir.Operand | None) -> bool:
+        """Return True if a number is computed from a part of a taught position."""
+        if expression is None or isinstance(expression, ir.Num):
+            return False
+        parts = (one for one in ir.data_in(expression) if one.steps)
+        places = (self.locate(one) for one in parts if not one.name.startswith("$"))
+        held = (self.store.read(key) for place in places for key in place.keys)
+        return any(isinstance(one, Position) and one.taught for one in held)
 
     def read_number(self, expression: ir.Operand | None) -> WrittenNumber:
         """Return a number, and where in the text it is written or comes from."""
@@ -424,7 +434,8 @@ def set_owner(here: Execution, name: str, key: str, value: Position) -> Position
     """Say which variable a literal is the value of."""
     declared = here.world.find_declaration(here.place, name)
     shared = value.shared or bool(declared and declared.exported)
-    taught = value.taught or bool(declared and declared.taught)
     owner = value.name or here.world.spell(key)
+    taught = value.taught or bool(declared and declared.taught)
+    taught = taught or here.world.is_listed(owner)
     here.world.hold(key, value)
     return replace(value, name=owner, shared=shared, taught=taught)

@@ -272,6 +272,11 @@ class World:
             for slot in value.of:
                 self.pinned.setdefault(slot, why)
 
+    def is_listed(self, name: str) -> bool:
+        """Tell whether the cell file says that a point was taught."""
+        taught, name = self.start.taught, name.lower()
+        return bool(taught) and (name in taught or base_variable(name) in taught)
+
     def hold(self, key: str, value: Position) -> None:
         """Note that a variable, or a part of it, holds a position at some time."""
         self.held.setdefault(root_of(key), set()).add(value.slots)

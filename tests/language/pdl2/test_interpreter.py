@@ -394,3 +394,45 @@ def test_numbers_that_points_share_are_no_literal_of_any() -> None:
     )
     assert found.visits.target.values[:, 0].tolist() == [7.0, 7.0, 2.0]
     assert found.visits.target.literal.tolist() == [-1, -1, -1]
+
+
+PLACE = "POS(1, 2, 3, 0, 180, 0, '')"
+MADE_FROM = {
+    "it": "$UFRAME := fr",
+    "a copy": "g := fr\n$UFRAME := g",
+    "a shift": "$UFRAME := POS_SHIFT(fr, VEC(0, 0, 5))",
+    "behind another": "$UFRAME := g : fr",
+    "in front of another": "$UFRAME := fr : g",
+    "its inverse": "$UFRAME := POS_INV(fr)",
+    "its numbers": "$UFRAME := POS(fr.X, fr.Y + 1, 3, fr.A, fr.E, fr.R, '')",
+    "a number": "g.X := fr.X\n$UFRAME := g",
+    "a number, set": "$UFRAME := g\n$UFRAME.X := fr.X",
+}
+MARKS = {
+    "by the cell": ("", {"fr"}),
+    "by a comment": (" -- TAUGHT", set[str]()),
+    "not": ("", {"other"}),
+}
+
+
+@pytest.mark.parametrize("lines", MADE_FROM.values(), ids=MADE_FROM)
+@pytest.mark.parametrize("mark", MARKS)
+def test_a_frame_that_is_made_from_a_taught_one_was_taught(
+    lines: str, mark: str
+) -> None:
+    comment, listed = MARKS[mark]
+    start = Start((0,) * 6, (0,) * 6, (0,) * 6, taught=frozenset(listed))
+    text = f"fr := {PLACE}{comment}\ng := {PLACE}\n{lines}\nMOVE LINEAR TO {PLACE}"
+    found = body(text, start, "VAR fr, g : POSITION")
+    frames = found.visits.frame
+    assert reasons(found) == [""]
+    assert frames.taught[frames.uframe[0]] == (mark != "not")
+
+
+@pytest.mark.parametrize("name", ["fr", "tab"])
+def test_a_declared_frame_that_the_cell_lists_was_taught(name: str) -> None:
+    start = Start((0,) * 6, (0,) * 6, (0,) * 6, taught=frozenset({name}))
+    text = f"$UFRAME := fr\nMOVE LINEAR TO {PLACE}"
+    found = body(text, start, f"VAR fr : POSITION ({PLACE})")
+    frames = found.visits.frame
+    assert frames.taught[frames.uframe[0]] == (name == "fr")
