@@ -333,21 +333,25 @@ class TaskSymbols(ABC, Generic[F]):
         names = names if held is None else names | held.names
         declared = (self.datum(name, here) for name in names)
         rows = {(one[0], one[1].row) for one in declared if one is not None}
-        for slot in list_slots_in(found):
+        slots = {*list_slots_in(found)}
+        for slot in slots:
             file = self.numbering.file_of(slot)
             own = self.numbering.first[file]
             rows.add((file, self.files[file].text.row_of(slot - own)))
         listed = not names.isdisjoint(self.start.taught)
-        listed |= not rows.isdisjoint(self._listed_rows)
+        listed |= not slots.isdisjoint(self.listed_slots)
         return listed or any(self.is_taught("", *one) for one in rows)
 
     @cached_property
-    def _listed_rows(self) -> frozenset[tuple[int, int]]:
-        """Statements, by file and row, that declare what the cell says was taught."""
+    def listed_slots(self) -> frozenset[int]:
+        """Numbers of data that the cell says were taught, where they are declared."""
         pairs = ((k, one) for k, file in enumerate(self.files) for one in file.data)
-        return frozenset(
-            (k, one.row) for k, one in pairs if one.name in self.start.taught
+        found = (
+            self.value(one.value, self.scope_of_datum(k, one))
+            for k, one in pairs
+            if one.name in self.start.taught
         )
+        return frozenset(slot for value in found for slot in list_slots_in(value))
 
     # What statements change and take.
 

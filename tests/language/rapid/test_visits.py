@@ -468,6 +468,17 @@ def test_what_was_taught_is_known_by_the_cell_or_a_comment():
     assert taught(task(inline, inline + " ! taught", L.format("p1"))) == [0, 1, 0]
 
 
+@pytest.mark.parametrize("given", ["q:=p1;", "q:=Offs(p1,0,0,5);", "r:=p1;q:=r;"])
+@pytest.mark.parametrize("name", ["p1", "p2", "pos"])
+def test_a_point_that_the_cell_lists_is_taught_by_any_name(given, name):
+    data = DATA + "\nLOCAL VAR robtarget q; LOCAL VAR robtarget r;"
+    listed = Start(taught=(name,))
+    assert taught(task(given, L.format("q"), data=data, start=listed)) == [name == "p1"]
+    copy = "q:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];r:=q;"
+    listed = Start(taught=("q" if name == "p1" else name,))
+    assert taught(task(copy, L.format("r"), data=data, start=listed)) == [name == "p1"]
+
+
 def test_frames_that_were_taught():
     def frames(found):
         v = found.visits
