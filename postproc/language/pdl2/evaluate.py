@@ -437,5 +437,4 @@ def set_owner(here: Execution, name: str, key: str, value: Position) -> Position
     owner = value.name or here.world.spell(key)
     taught = value.taught or bool(declared and declared.taught)
     taught = taught or here.world.is_listed(owner)
-    here.world.hold(key, value)
     return replace(value, name=owner, shared=shared, taught=taught)

@@ -319,7 +319,7 @@ def resolve(
         )  # fmt: skip
         machine = _list_moves(world)
     _keep_exported(world, machine)
-    world.pin_loose()
+    world.pin_loose(machine.given)
     world.settle()
     collector = Pdl2Collector(machine)
     visits = collector.collect()
