@@ -328,9 +328,7 @@ class TaskSymbols(ABC, Generic[F]):
             found: The value.
             here: Where it is taken.
         """
-        held, names = self.find_held(operand, here), frozenset[str]()
-        names = names if operand is None else self.names_of(operand)
-        names = names if held is None else names | held.names
+        names = self.names_behind(operand, here)
         declared = (self.datum(name, here) for name in names)
         rows = {(one[0], one[1].row) for one in declared if one is not None}
         slots = {*list_slots_in(found)}
@@ -785,6 +783,18 @@ class TaskSymbols(ABC, Generic[F]):
             self._names[key] = operand, frozenset(one.name for one in parts)
         return self._names[key][1]
 
+    def names_behind(self, operand: ir.Operand | None, here: Scope) -> frozenset[str]:
+        """Return the names in an operand, and of what its data were made from."""
+        own = frozenset() if operand is None else self.names_of(operand)
+        return own.union(*(held.names for held in self._list_held(operand, here)))
+
+    def _list_held(
+        self, operand: ir.Operand | None, here: Scope
+    ) -> list[AssignedPoint]:
+        """List what assignments gave to the data in an operand."""
+        wholes = map(_without_components, ir.data_in(operand))
+        return [held for one in wholes if (held := self.find_held(one, here))]
+
     def calls_routine(self, operand: ir.Operand) -> bool:
         """Return True if an operand calls a function of the task."""
         return not self.names_of(operand).isdisjoint(self.routines)
@@ -824,8 +834,7 @@ class TaskSymbols(ABC, Generic[F]):
         known = None if part.component else self.find_held(value, here)
         if known is not None:
             return known.copy_to(place, index, own)
-        wholes = map(_without_components, ir.data_in(value))
-        inside = [held for one in wholes if (held := self.find_held(one, here))]
+        inside = self._list_held(value, here)
         plain, names = replace(here, points=NO_POINTS), self.names_of(value)
         found, given = self.value(value, here), [one[0] for one in here.given]
         steady = not (inside or self.calls_routine(value)) and names.isdisjoint(given)

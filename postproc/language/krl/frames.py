@@ -8,12 +8,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.diagnostics import Code, Reason
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame, compose_poses
 from postproc.language.analysis.symbols import whole
-from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
+from postproc.language.analysis.values import (
+    KnownRecord,
+    Value,
+    WrittenNumber,
+    is_written,
+    list_slots_in,
+)
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
@@ -28,6 +34,7 @@ def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> TaskFrame:
 
 NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
+_NUMBERED = {*TABLES.values()}
 _WHICH = "which entry of {} it takes is known only when the program runs"
 _CHAINED = "its base moves with another axis or arm ({})"
 _MAY_BE_ON = (
@@ -167,12 +174,33 @@ class FrameReader:
         value = self.task.value(operand, self.here)
         pose = pose_of(value)
         name = operand.name if isinstance(operand, ir.DataObject) else ""
+        if pose and (why := self._explain_entry(operand, value)):
+            return TaskFrame((), why)
         if pose:
             taught = self.task.holds_taught(operand, value, self.here)
             return TaskFrame(pose, taught=taught)
         if name:
             return TaskFrame((), self._unknown(name.upper(), name))
         return no_frame("a frame is not written whole")
+
+    def _explain_entry(self, operand: ir.Operand, value: Value | None) -> Reason:
+        """Say why data are no known frame that are given an entry of a table.
+
+        What is computed from one does not tell which one that was.
+        """
+        names = self.task.names_behind(operand, self.here)
+        if not (
+            is_written(value) or names.isdisjoint(_NUMBERED | {*self.task.routines})
+        ):
+            text = "a frame is computed from an entry of TOOL_DATA or BASE_DATA"
+            return Reason(Code.FRAME_UNKNOWN, text)
+        for file, one in self.task.elements("base_data") if names & _NUMBERED else ():
+            own = self.task.value(one.value, self.task.scope_of_datum(file, one))
+            shared = {*list_slots_in(own)} & {*list_slots_in(value)}
+            if shared and self._is_chained(one.index[0]):
+                chain = _CHAINED.format(f"MACHINE_FRAME_DAT[{one.index[0]}]")
+                return Reason(Code.EXTERNAL_AXES, chain)
+        return NO_REASON
 
     @staticmethod
     def _product(first: TaskFrame, second: TaskFrame) -> TaskFrame:

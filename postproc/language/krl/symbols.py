@@ -194,6 +194,11 @@ class KrlTask(TaskSymbols[KrlFile]):
             return None
         return self.value(found[1].value, self.scope_of_datum(*found))
 
+    def elements(self, array: str) -> Iterator[tuple[int, Datum]]:
+        """Yield the elements of an array that are given values, and their files."""
+        pairs = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        return (pair for pair in pairs if pair[1].name == array and pair[1].index)
+
     def is_steady(self, array: str, index: tuple[int, ...]) -> bool:
         """Return True if no statement of the files may change an element."""
         written = self._elements_written.get(array, {ANY})

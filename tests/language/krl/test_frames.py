@@ -367,19 +367,20 @@ def test_the_arm_may_be_taken_along_before_another_base_is_set():
 
 ASSIGNED = {
     "written": ["FR={X 1,Y 2,Z 3,A 0,B 0,C 0}"],
-    "copied": ["FR=BASE_DATA[2]", "FR.X=1", "FR.Y=2", "FR.Z=3"],
-    "linked": ["FR=BASE_DATA[3]:{X 1,Y 2,Z 3,A 0,B 0,C 0}"],
+    "copied": ["FB={X 1,Y 2,Z 3,A 0,B 0,C 0}", "FR=FB"],
+    "in parts": ["FR={X 1,Y 0,Z 0,A 0,B 0,C 0}", "FR.Y=2", "FR.Z=3"],
+    "linked": ["FR={X 1,Y 2,Z 0,A 0,B 0,C 0}:{X 0,Y 0,Z 3,A 0,B 0,C 0}"],
 }
 
 
 @pytest.mark.parametrize("lines", ASSIGNED.values(), ids=ASSIGNED)
 @pytest.mark.parametrize("sets", [["$BASE=FR"], ["BASE_DATA[5]=FR", "BAS(#BASE,5)"]])
 def test_a_frame_that_is_assigned_on_the_way_is_known(lines, sets):
-    found = job("DECL FRAME FR", INIT, "BAS(#TOOL,1)", *lines, *sets, "LIN XP1")
+    found = job("DECL FRAME FR,FB", INIT, "BAS(#TOOL,1)", *lines, *sets, "LIN XP1")
     assert reasons(found) == [""]
     np.testing.assert_allclose(places(found)[1], [1, 2, 3], atol=1e-9)
     ways = [*lines, "IF $IN[1] THEN", "FR.X=7", "ENDIF", *sets]
-    found = job("DECL FRAME FR", INIT, "BAS(#TOOL,1)", *ways, "LIN XP1")
+    found = job("DECL FRAME FR,FB", INIT, "BAS(#TOOL,1)", *ways, "LIN XP1")
     assert "FR" in reasons(found)[0] or "BASE_DATA[5]" in reasons(found)[0]
 
 
@@ -388,10 +389,30 @@ def test_a_frame_that_is_made_from_a_taught_one_was_taught():
     marked = CONFIG.replace("Z 500,A 0,B 0,C 0}", "Z 500,A 0,B 0,C 0} ; TAUGHT", 1)
     by_cell = {"start": Start(taught=frozenset({"base_data"}))}
     for more in (by_cell, {"config": marked}):
-        for set_ in (["FR=BASE_DATA[2]"], ["FR=BASE_DATA[2]", "FR.Z=3"]):
-            found = job("DECL FRAME FR", INIT, *set_, "$BASE=FR", "LIN XP1", **more)
-            v = found.visits
-            assert v.frame.taught[v.frame.uframe[0]]
+        lines = "DECL FRAME FR", INIT, "FR=BASE_DATA[2]", "$BASE=FR", "LIN XP1"
+        v = job(*lines, **more).visits
+        assert v.frame.taught[v.frame.uframe[0]]
+
+
+FROM_TABLES = [
+    ["FR=BASE_DATA[4]"],  # it hangs on an external axis
+    ["FR=BASE_DATA[2]", "FR.Z=3"],
+    ["FR=BASE_DATA[2]:{X 1,Y 0,Z 0,A 0,B 0,C 0}"],
+    ["FB=BASE_DATA[2]", "FR=FB", "FR.X=BASE_DATA[4].X"],
+    ["FR=linked( )"],
+    ["V=BASE_DATA[4].X", "FR={X V,Y 0,Z 0,A 0,B 0,C 0}"],
+]
+
+
+@pytest.mark.parametrize("lines", FROM_TABLES)
+def test_a_frame_that_is_computed_from_an_entry_is_left(lines):
+    """Whether it was taught, or hangs on another axis, is that of the entry."""
+    more = (
+        "DEFFCT FRAME linked( )\nRETURN BASE_DATA[4]:{X 1,Y 0,Z 0,A 0,B 0,C 0}\nENDFCT"
+    )
+    declared = "DECL FRAME FR,FB", "DECL REAL V", INIT, "BAS(#TOOL,1)"
+    found = job(*declared, *lines, "$BASE=FR", "LIN XP1", more=more)
+    assert "entry of" in reasons(found)[0] or "MACHINE_FRAME" in reasons(found)[0]
 
 
 def test_a_speed_that_is_assigned_on_the_way_is_known():
