@@ -25,6 +25,7 @@ from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
 
 ZERO = TaskFrame(IDENTITY)
+SAME = 1e-9  # [m] and in rotation matrices: the frame of the cell
 
 
 def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> TaskFrame:
@@ -147,7 +148,7 @@ class FrameReader:
             pose = pose_of(self.task.entry(table, number, self.here))
             taught = self.task.is_taught(table, found[0], found[1].row)
             if pose:
-                return TaskFrame(pose, taught=taught)
+                return self._make(pose, taught)
         return TaskFrame((), self._unknown(shown, table))
 
     def _read_held(self, name: str, key: str) -> object | None:
@@ -178,10 +179,15 @@ class FrameReader:
             return TaskFrame((), why)
         if pose:
             taught = self.task.holds_taught(operand, value, self.here)
-            return TaskFrame(pose, taught=taught)
+            return self._make(pose, taught)
         if name:
             return TaskFrame((), self._unknown(name.upper(), name))
         return no_frame("a frame is not written whole")
+
+    def _make(self, pose: Pose, taught: bool) -> TaskFrame:
+        """Return a frame; one of the cell may be taught that stands in its place."""
+        apart = (np.abs(np.subtract(pose, one)).max() for one in self.task.taught_poses)
+        return TaskFrame(pose, taught=taught or min(apart, default=1.0) <= SAME)
 
     def _explain_entry(self, operand: ir.Operand, value: Value | None) -> Reason:
         """Say why data are no known frame that are given an entry of a table.

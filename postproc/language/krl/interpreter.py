@@ -40,6 +40,7 @@ from postproc.language.krl.symbols import (
     KrlTask,
     package_routines,
 )
+from postproc.language.language import Record, Start
 from postproc.language.visits import START
 
 _INTERRUPT = Reason(
@@ -102,7 +103,8 @@ class KrlMachine(TaskMachine):
     def run(self) -> None:
         """Follow every way from the first routine."""
         modes = KrlModes(
-            tool=_frame(self.task.start.tool), base=_frame(self.task.start.uframe)
+            tool=_frame(self.task.start, self.task.start.tool),
+            base=_frame(self.task.start, self.task.start.uframe),
         )
         modes = modes.beside(self.task)
         first = self.task.files[0]
@@ -518,9 +520,9 @@ def _is_modal(name: str) -> bool:
     return own or (name.startswith("$") and name not in HALTING | HARMLESS)
 
 
-def _frame(record: tuple[float, ...] | None) -> TaskFrame:
+def _frame(start: Start, record: Record) -> TaskFrame:
     """Take a frame over from the cell."""
-    return TaskFrame(() if record is None else cell_pose(record))
+    return TaskFrame(cell_pose(record), taught=record in start.taught_records)
 
 
 def _halt(here: Arrived, halted: bool | None) -> Arrived:

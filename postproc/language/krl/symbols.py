@@ -14,6 +14,7 @@ from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
+from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
@@ -21,7 +22,7 @@ from postproc.language.analysis.values import KnownRecord, Layout, Value, Writte
 from postproc.language.krl import syntax as said
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
-from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.shifts import Pose, Shift, ShiftKind
 from postproc.language.text.symbol_column import read_names
 
 CONFIG = "$config"
@@ -193,6 +194,11 @@ class KrlTask(TaskSymbols[KrlFile]):
         if found is None:
             return None
         return self.value(found[1].value, self.scope_of_datum(*found))
+
+    @cached_property
+    def taught_poses(self) -> Sequence[Pose]:
+        """Frames of the cell that were taught."""
+        return [cell_pose(record) for record in self.start.taught_records]
 
     def elements(self, array: str) -> Iterator[tuple[int, Datum]]:
         """Yield the elements of an array that are given values, and their files."""

@@ -158,7 +158,7 @@ class Execution:
                 values = [*map(self.value, operands)]
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
-                return operate(sign, *values)
+                return operate(sign, *map(self.find_taught, values))
             case ir.Composite(items) if len(items) < 6:
                 return Nothing("it has fewer than six joint values")
             case ir.Composite(items):
@@ -254,6 +254,13 @@ class Execution:
             taught=any(map(self.takes_taught, items)),
         )
 
+    def find_taught(self, value: Value) -> Value:
+        """Return a value, as taught where it is a taught frame of the cell."""
+        records = self.world.start.taught_records
+        if records and isinstance(value, Position) and value.numbers in records:
+            return replace(value, taught=True)
+        return value
+
     def takes_taught(self, expression: ir.Operand | None) -> bool:
         """Return True if a number is computed from a part of a taught position."""
         if expression is None or isinstance(expression, ir.Num):
@@ -315,7 +322,7 @@ class Execution:
         if name not in ("vec", "pos_shift"):
             for value in values:
                 self.world.pin(value, f"{name.upper()} computes with it")
-        match name, values:
+        match name, [*map(self.find_taught, values)]:
             case "vec", [_, _, _]:
                 x, y, z = (self.real(a) for a in arguments)
                 return Vector((x, y, z))

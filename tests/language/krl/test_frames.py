@@ -447,3 +447,16 @@ def test_the_index_of_an_entry_is_that_of_the_routine_not_of_the_list():
     changes = "DEF put(N:IN)\nINT N\nBASE_DATA[N]={X 1,Y 2,Z 3,A 0,B 0,C 0}\nEND\n"
     found = job("put(2)", "unknown( )", INIT, *XS2, more=changes)
     assert "BASE_DATA[2] may be changed" in reasons(found)[0]
+
+
+CELL = (1000.0, 100.0, 500.0, 0.0, 0.0, 0.0)
+CHANGES = ["$BASE.X=5", "$BASE=$BASE:{X 1,Y 0,Z 0,A 0,B 0,C 0}"]
+
+
+@pytest.mark.parametrize("line", CHANGES)
+@pytest.mark.parametrize("taught", [True, False])
+@pytest.mark.parametrize("before", [[], ["$BASE=BASE_DATA[2]"]])
+def test_what_comes_of_a_taught_frame_of_the_cell_was_taught(line, taught, before):
+    start = Start(uframe=CELL, taught_records=[CELL] if taught else [])
+    v = job(*before, line, "LIN XP1", start=start).visits
+    assert v.frame.taught[v.frame.uframe].tolist() == [taught]
