@@ -517,6 +517,15 @@ def test_a_frame_that_is_made_from_a_taught_one_was_taught(copy, by_cell):
     assert not own.frame.taught[own.frame.uframe[0]]
 
 
+@pytest.mark.parametrize("given", ["w.oframe", "d"])
+@pytest.mark.parametrize("name", ["w", "d", "t"])
+def test_a_displacement_that_was_taught_is_not_known(given, name):
+    data = DATA + "\nCONST pose d:=[[0,0,7],[1,0,0,0]];"
+    lines = f"PDispSet {given};", L.format("p1")
+    found = task(*lines, data=data, start=Start(taught=frozenset({name})))
+    assert bool(reasons(found)[0]) == (name == given[0])
+
+
 def test_measured_moves_carry_their_ids():
     arc = f"MoveC p2,[[7,8,9],[1,0,0,0],{END},v200,fine,t\\WObj:=w;"
     found = task(
