@@ -149,6 +149,7 @@ def start_of(cell: Cell) -> Start:
         frame_tables=tables,
         aux=dict(cell.aux),
         taught=cell.taught,
+        taught_records=frozenset(cell.taught_frames),
         arm=cell.arm_number,
         linear_speed=None if speed is None else speed * MM,
         override=cell.file.motion.override,

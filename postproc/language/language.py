@@ -45,6 +45,7 @@ class Start:
             frames (``tool``, ``base``, ``uframe``) that it sets.
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
         taught: Names of points that were taught with the robot.
+        taught_records: Frames of the cell that were.
         arm: Number of our arm.
         linear_speed: Of the TCP [m/s] where a program sets none, None where unknown.
         override: Likewise, of all speeds [%].
@@ -63,6 +64,7 @@ class Start:
     )
     aux: Mapping[int, str] = field(default_factory=dict)
     taught: Collection[str] = frozenset()
+    taught_records: Collection[Record] = frozenset()
     arm: int = 1
     linear_speed: float | None = None
     override: float | None = None
@@ -89,13 +91,6 @@ class Start:
         said = (self.routines[name] for name in names if name in self.routines)
         still = "motionless" if matches(self.motionless, names) else ""
         return next(said, still)
-
-    @property
-    def records(self) -> frozenset[Record]:
-        """Return all frames that the cell gives."""
-        tables = [e for table in self.frame_tables.values() for e in table.values()]
-        given = [record for entry in tables for record in entry.values()]
-        return frozenset([self.tool, self.base, self.uframe, *given])
 
 
 @lru_cache(maxsize=8192)

@@ -34,6 +34,7 @@ from postproc.language.analysis.values import (
     apply_function,
     apply_operator,
     is_written,
+    list_slots_in,
     number_in,
     put_together,
     spell_components,
@@ -316,6 +317,39 @@ class TaskSymbols(ABC, Generic[F]):
         return name in self.start.taught or not self.taught_lines[file].isdisjoint(
             lines
         )
+
+    def holds_taught(
+        self, operand: ir.Operand | None, found: Value | None, here: Scope
+    ) -> bool:
+        """Return True if any data or number that a value is made from was taught.
+
+        Args:
+            operand: What holds the value.
+            found: The value.
+            here: Where it is taken.
+        """
+        names = self.names_behind(operand, here)
+        declared = (self.datum(name, here) for name in names)
+        rows = {(one[0], one[1].row) for one in declared if one is not None}
+        slots = {*list_slots_in(found)}
+        for slot in slots:
+            file = self.numbering.file_of(slot)
+            own = self.numbering.first[file]
+            rows.add((file, self.files[file].text.row_of(slot - own)))
+        listed = not names.isdisjoint(self.start.taught)
+        listed |= not slots.isdisjoint(self.listed_slots)
+        return listed or any(self.is_taught("", *one) for one in rows)
+
+    @cached_property
+    def listed_slots(self) -> frozenset[int]:
+        """Numbers of data that the cell says were taught, where they are declared."""
+        pairs = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        found = (
+            self.value(one.value, self.scope_of_datum(k, one))
+            for k, one in pairs
+            if one.name in self.start.taught
+        )
+        return frozenset(slot for value in found for slot in list_slots_in(value))
 
     # What statements change and take.
 
@@ -749,6 +783,18 @@ class TaskSymbols(ABC, Generic[F]):
             self._names[key] = operand, frozenset(one.name for one in parts)
         return self._names[key][1]
 
+    def names_behind(self, operand: ir.Operand | None, here: Scope) -> frozenset[str]:
+        """Return the names in an operand, and of what its data were made from."""
+        own = frozenset() if operand is None else self.names_of(operand)
+        return own.union(*(held.names for held in self._list_held(operand, here)))
+
+    def _list_held(
+        self, operand: ir.Operand | None, here: Scope
+    ) -> list[AssignedPoint]:
+        """List what assignments gave to the data in an operand."""
+        wholes = map(_without_components, ir.data_in(operand))
+        return [held for one in wholes if (held := self.find_held(one, here))]
+
     def calls_routine(self, operand: ir.Operand) -> bool:
         """Return True if an operand calls a function of the task."""
         return not self.names_of(operand).isdisjoint(self.routines)
@@ -788,8 +834,7 @@ class TaskSymbols(ABC, Generic[F]):
         known = None if part.component else self.find_held(value, here)
         if known is not None:
             return known.copy_to(place, index, own)
-        wholes = map(_without_components, ir.data_in(value))
-        inside = [held for one in wholes if (held := self.find_held(one, here))]
+        inside = self._list_held(value, here)
         plain, names = replace(here, points=NO_POINTS), self.names_of(value)
         found, given = self.value(value, here), [one[0] for one in here.given]
         steady = not (inside or self.calls_routine(value)) and names.isdisjoint(given)

@@ -468,11 +468,11 @@ class TaskCollector(Collector):
         goals = [v.goal for v in self.found]
         places = [{one.writes[0], one.point} for one in goals]
         written = {place for some in places for place in some if place >= 0}
-        marked = _find_marked(written, self.machine)
+        marked = _find_marked(written, self.machine) | self.machine.task.listed_slots
+        names = [{*one.names, whole_name(one.name).strip().lower()} for one in goals]
         return [
-            whole_name(one.name).strip().lower() in taught
-            or not marked.isdisjoint(some)
-            for one, some in zip(goals, places, strict=True)
+            not (own.isdisjoint(taught) and marked.isdisjoint(some))
+            for own, some in zip(names, places, strict=True)
         ]
 
 

@@ -94,6 +94,16 @@ def list_leaves(found: Value | None) -> Iterator[WrittenNumber | KnownRecord | s
         yield found
 
 
+def list_slots_in(found: Value | None) -> Iterator[int]:
+    """Yield where the numbers of a value are written."""
+    if isinstance(found, KnownRecord):
+        found = tuple(one for _, one in found.fields)
+    for one in found if isinstance(found, tuple) else ():
+        yield from list_slots_in(one)
+    if isinstance(found, WrittenNumber) and found.slot >= 0:
+        yield found.slot
+
+
 def without_places(found: Value | None) -> Value | None:
     """Return values without where they are written."""
     if isinstance(found, tuple):

@@ -8,17 +8,24 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.diagnostics import Code, Reason
+from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame, compose_poses
 from postproc.language.analysis.symbols import whole
-from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
+from postproc.language.analysis.values import (
+    KnownRecord,
+    Value,
+    WrittenNumber,
+    is_written,
+    list_slots_in,
+)
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl.symbols import CONFIG, KrlTask
 from postproc.language.shifts import IDENTITY, Pose, flat
 
 ZERO = TaskFrame(IDENTITY)
+SAME = 1e-9  # [m] and in rotation matrices: the frame of the cell
 
 
 def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> TaskFrame:
@@ -28,6 +35,7 @@ def no_frame(text: str, code: Code = Code.FRAME_UNKNOWN) -> TaskFrame:
 
 NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
+_NUMBERED = {*TABLES.values()}
 _WHICH = "which entry of {} it takes is known only when the program runs"
 _CHAINED = "its base moves with another axis or arm ({})"
 _MAY_BE_ON = (
@@ -136,11 +144,11 @@ class FrameReader:
         if isinstance(held, TaskFrame) and self.task.is_global(table, self.here):
             return held
         found = self.task.datum(table, self.here, (number,))
-        if found is not None and self.task.is_steady(table, number):
+        if found is not None and self.task.is_steady(table, (number,)):
             pose = pose_of(self.task.entry(table, number, self.here))
             taught = self.task.is_taught(table, found[0], found[1].row)
             if pose:
-                return TaskFrame(pose, taught=taught)
+                return self._make(pose, taught)
         return TaskFrame((), self._unknown(shown, table))
 
     def _read_held(self, name: str, key: str) -> object | None:
@@ -167,14 +175,38 @@ class FrameReader:
         value = self.task.value(operand, self.here)
         pose = pose_of(value)
         name = operand.name if isinstance(operand, ir.DataObject) else ""
+        if pose and (why := self._explain_entry(operand, value)):
+            return TaskFrame((), why)
         if pose:
-            found = self.task.datum(name, self.here) if name else None
-            at = (found[0], found[1].row) if found else (self.here.file, self.here.row)
-            known = found is not None or not name
-            return TaskFrame(pose, taught=known and self.task.is_taught(name, *at))
+            taught = self.task.holds_taught(operand, value, self.here)
+            return self._make(pose, taught)
         if name:
             return TaskFrame((), self._unknown(name.upper(), name))
         return no_frame("a frame is not written whole")
+
+    def _make(self, pose: Pose, taught: bool) -> TaskFrame:
+        """Return a frame; one of the cell may be taught that stands in its place."""
+        apart = (np.abs(np.subtract(pose, one)).max() for one in self.task.taught_poses)
+        return TaskFrame(pose, taught=taught or min(apart, default=1.0) <= SAME)
+
+    def _explain_entry(self, operand: ir.Operand, value: Value | None) -> Reason:
+        """Say why data are no known frame that are given an entry of a table.
+
+        What is computed from one does not tell which one that was.
+        """
+        names = self.task.names_behind(operand, self.here)
+        if not (
+            is_written(value) or names.isdisjoint(_NUMBERED | {*self.task.routines})
+        ):
+            text = "a frame is computed from an entry of TOOL_DATA or BASE_DATA"
+            return Reason(Code.FRAME_UNKNOWN, text)
+        for file, one in self.task.elements("base_data") if names & _NUMBERED else ():
+            own = self.task.value(one.value, self.task.scope_of_datum(file, one))
+            shared = {*list_slots_in(own)} & {*list_slots_in(value)}
+            if shared and self._is_chained(one.index[0]):
+                chain = _CHAINED.format(f"MACHINE_FRAME_DAT[{one.index[0]}]")
+                return Reason(Code.EXTERNAL_AXES, chain)
+        return NO_REASON
 
     @staticmethod
     def _product(first: TaskFrame, second: TaskFrame) -> TaskFrame:

@@ -40,6 +40,7 @@ from postproc.language.krl.symbols import (
     KrlTask,
     package_routines,
 )
+from postproc.language.language import Record, Start
 from postproc.language.visits import START
 
 _INTERRUPT = Reason(
@@ -102,7 +103,8 @@ class KrlMachine(TaskMachine):
     def run(self) -> None:
         """Follow every way from the first routine."""
         modes = KrlModes(
-            tool=_frame(self.task.start.tool), base=_frame(self.task.start.uframe)
+            tool=_frame(self.task.start, self.task.start.tool),
+            base=_frame(self.task.start, self.task.start.uframe),
         )
         modes = modes.beside(self.task)
         first = self.task.files[0]
@@ -224,15 +226,15 @@ class KrlMachine(TaskMachine):
             modes = modes.drop(name)
         return here.with_modes(modes)
 
-    def _modes(self, at: At) -> ModeReader:
-        return ModeReader(self.task, scope_at(at))
+    def _modes(self, at: At, here: Arrived) -> ModeReader:
+        return ModeReader(self.task, scope_at(at, here))
 
     def _assign(self, at: At, one: ir.Assignment, here: Arrived) -> Arrived:
         """Give a value to data, or change how moves are made."""
         name = one.target.name
         if name.startswith("$") and name not in PLANNED:
             here = _halt(here, True if name in HALTING else None)
-        modes = self._modes(at).assign(here.modes, one)
+        modes = self._modes(at, here).assign(here.modes, one)
         if modes is None:
             what = (
                 f"sets {name.upper()}: what that does to moves is not known. Take it "
@@ -253,7 +255,7 @@ class KrlMachine(TaskMachine):
             command = one.arguments[0].value if one.arguments else None
             if isinstance(command, said.EnumValue) and command.name.startswith("#out_"):
                 here = _halt(here, None)  # outputs are switched, which may stop the arm
-            return here.with_modes(self._modes(at).bas(here.modes, one.arguments))
+            return here.with_modes(self._modes(at, here).bas(here.modes, one.arguments))
         if name == "pulse":
             return _halt(here, True)
         if name == "on_error_proceed":
@@ -518,9 +520,9 @@ def _is_modal(name: str) -> bool:
     return own or (name.startswith("$") and name not in HALTING | HARMLESS)
 
 
-def _frame(record: tuple[float, ...] | None) -> TaskFrame:
+def _frame(start: Start, record: Record) -> TaskFrame:
     """Take a frame over from the cell."""
-    return TaskFrame(() if record is None else cell_pose(record))
+    return TaskFrame(cell_pose(record), taught=record in start.taught_records)
 
 
 def _halt(here: Arrived, halted: bool | None) -> Arrived:

@@ -435,7 +435,7 @@ class ModeReader:
         held = modes.store.get(symbols.entry_name("load_data", entry))
         if isinstance(held, tuple) and "load_data" not in self.task.beside:
             return modes.with_(load=held)
-        if not self.task.is_steady("load_data", entry):
+        if not self.task.is_steady("load_data", (entry,)):
             return modes.with_(load=LOST_LOAD)
         if entry <= 0 or self.task.datum("load_data", self.here, (entry,)) is None:
             return modes.with_(load=CELL_LOAD)

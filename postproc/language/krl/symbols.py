@@ -14,6 +14,7 @@ from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
+from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
@@ -21,11 +22,11 @@ from postproc.language.analysis.values import KnownRecord, Layout, Value, Writte
 from postproc.language.krl import syntax as said
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
-from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.shifts import Pose, Shift, ShiftKind
 from postproc.language.text.symbol_column import read_names
 
 CONFIG = "$config"
-ANY = -1  # an entry of a table whose number is not known
+ANY: tuple[int, ...] = ()  # an element whose index is not known
 POSITIONS = ("pos", "e6pos")  # types
 AXES = tuple(f"a{k}" for k in range(1, 7))
 OUTSIDE = tuple(f"e{k}" for k in range(1, 7))
@@ -124,8 +125,9 @@ class KrlTask(TaskSymbols[KrlFile]):
         return not datum.routine
 
     def keeps(self, file: int, datum: Datum) -> bool:
-        """Return True where no statement changes data."""
-        return not (datum.name in self.written or datum.name.startswith("$"))
+        """Return True where no statement changes data, of an array the element."""
+        changed = datum.name.startswith("$") or datum.name in self.written
+        return not changed or self.is_steady(datum.name, datum.index)
 
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
         """Leave variables of the system, and of loops."""
@@ -193,29 +195,46 @@ class KrlTask(TaskSymbols[KrlFile]):
             return None
         return self.value(found[1].value, self.scope_of_datum(*found))
 
-    def is_steady(self, table: str, number: int) -> bool:
-        """Return True if no statement of the files may change an entry of a table."""
-        return not ({number, ANY} & self._entries_written[table])
+    @cached_property
+    def taught_poses(self) -> Sequence[Pose]:
+        """Frames of the cell that were taught."""
+        return [cell_pose(record) for record in self.start.taught_records]
+
+    def elements(self, array: str) -> Iterator[tuple[int, Datum]]:
+        """Yield the elements of an array that are given values, and their files."""
+        pairs = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        return (pair for pair in pairs if pair[1].name == array and pair[1].index)
+
+    def is_steady(self, array: str, index: tuple[int, ...]) -> bool:
+        """Return True if no statement of the files may change an element."""
+        written = self._elements_written.get(array, {ANY})
+        return bool(index) and written.isdisjoint({index, ANY})
 
     @cached_property
-    def _entries_written(self) -> Mapping[str, frozenset[int]]:
-        """Collect the entries of tables that statements may change."""
-        found: dict[str, set[int]] = {table: set() for table in TABLES}
-        for table in self.odd_words.intersection(TABLES):
-            found[table].add(ANY)
+    def _elements_written(self) -> Mapping[str, set[tuple[int, ...]]]:
+        """Collect the elements that statements may change, of arrays by name."""
+        arrays = {*TABLES, *(one.name for one in self.every_datum if one.index)}
+        found: dict[str, set[tuple[int, ...]]] = {name: set() for name in arrays}
+        for name in (self.odd_words | self.called_beside) & arrays:
+            found[name].add(ANY)
         for number, file in enumerate(self.files):
-            there = Scope(number, file.name, "")
-            for row in file.text.where(lambda one: bool(self.list_changes(one))):
+            for row in file.text.where(
+                lambda one: any(data.name in arrays for data in self.list_changes(one))
+            ):
+                routine = self.routine_around(number, row)
+                here = self.scope_of(routine) if routine else Scope(number, "", "")
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
-                    if target.name in found and not given:
-                        found[target.name].add(self._entry(target, there.at(row)))
-        return {table: frozenset(numbers) for table, numbers in found.items()}
+                    if target.name in arrays and not given:
+                        found[target.name].add(self._index_of(target, here.at(row)))
+        return found
 
-    def _entry(self, target: ir.DataObject, here: Scope) -> int:
-        """Return the number of an entry, ANY where it is not known."""
-        index = self.index(target.steps[0], here) if target.steps else None
-        return index[0] if index is not None and len(index) == 1 else ANY
+    def _index_of(self, target: ir.DataObject, here: Scope) -> tuple[int, ...]:
+        """Return the index of an element, ANY where it is not known or an element."""
+        step = target.steps[0] if target.steps else ""
+        if isinstance(step, str) or any(data.steps for data in ir.data_in(step)):
+            return ANY
+        return self.index(step, here) or ANY
 
     def initial_switch(self, name: str) -> bool | None:
         """Return a switch that the program has not set so far, None if not known.

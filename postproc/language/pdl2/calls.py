@@ -11,7 +11,7 @@ from postproc.language import ir
 from postproc.language.analysis.call_context import At
 from postproc.language.analysis.origins import NOWHERE
 from postproc.language.analysis.values import WrittenNumber
-from postproc.language.language import Record
+from postproc.language.language import Record, Start
 from postproc.language.pdl2 import external_routines, side_effects
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES, Store
@@ -97,7 +97,7 @@ def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> No
     why = f"{name}, which is not followed, runs this move"
     nothing, reason = Nothing(why), Reason(Code.NEVER_REACHED, why)
     for row in range(body.first + 1, body.last):
-        statement = program.lines.statement(row)
+        statement = ast.action(program.lines.statement(row))
         if isinstance(statement, ast.Move):
             store = Store(lambda key: nothing, last=NOWHERE)
             store.forget_frames(why)
@@ -283,15 +283,16 @@ def _frames_from_table(
         )
         return
     for frame, record in rows[key].items():
-        here.store.set(**{frame: frame_value(record, f"{name}({key}) sets it")})
+        found = frame_value(here.world.start, record, f"{name}({key}) sets it")
+        here.store.set(**{frame: found})
 
 
-def frame_value(record: Record, why: str) -> Position | Nothing:
+def frame_value(start: Start, record: Record, why: str) -> Position | Nothing:
     """Return a frame of the cell file as a value."""
     if record is None:
         return Nothing(why)
-    numbers = tuple(float(n) for n in record)
-    return Position(False, numbers, derived="it stands in the cell file")
+    numbers, taught = tuple(float(n) for n in record), record in start.taught_records
+    return Position(False, numbers, derived="it stands in the cell file", taught=taught)
 
 
 # Assignments: what a variable, a component or a setting holds afterwards.
@@ -306,12 +307,14 @@ def assign(here: Execution, statement: ir.Assignment, taught: bool) -> None:
             invalidate_key(here, key, points_of(other))
         return
     if name.startswith("$"):
+        taught = taught or here.takes_taught(new)
         _setting(here, reference, _value(here, new, taught), taught)
         return
     target = here.locate(reference)
     if target.exact and target.number >= 0:
         part = here.read_number(new)
         held = _position(here, name, target.key).with_component(target.number, part)
+        held = replace(held, taught=held.taught or here.takes_taught(new))
         here.store.write(target.key, set_owner(here, name, target.key, held))
         return
     if copy_parts(here, new, reference):
@@ -374,19 +377,13 @@ def _setting(
 def _frame_part(
     here: Execution, name: str, at: int, value: Value, taught: bool
 ) -> None:
-    """Change one of the six numbers of a frame of our arm.
-
-    The cell may say of its own frames that they were taught: what comes of one whose
-    numbers change is not known then.
-    """
-    held = here.store.settings.get(name)
+    """Change one of the six numbers of a frame of our arm."""
+    held = here.find_taught(here.store.settings.get(name, Position()))
     if not isinstance(held, Position):
         held = Position()
     number = WrittenNumber(value if isinstance(value, float) else math.nan)
     taught = held.taught or taught
     new: Value = replace(held.with_component(at, number), taught=taught)
-    if any(held.numbers) and held.numbers in here.world.start.records:
-        new = Nothing(f"a part of ${name.upper()}, which the cell gives, is assigned")
     if f"${name}" in here.world.volatile:
         new = Nothing("a condition handler changes it")
     here.store.set(**{name: new})

@@ -158,7 +158,7 @@ class Execution:
                 values = [*map(self.value, operands)]
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
-                return operate(sign, *values)
+                return operate(sign, *map(self.find_taught, values))
             case ir.Composite(items) if len(items) < 6:
                 return Nothing("it has fewer than six joint values")
             case ir.Composite(items):
@@ -251,7 +251,24 @@ class Execution:
             numbers=tuple(None if value != value else value for value in values),
             slots=tuple(part.slot for part in parts),
             along=frozenset(at for at, part in enumerate(parts) if part.along),
+            taught=any(map(self.takes_taught, items)),
         )
+
+    def find_taught(self, value: Value) -> Value:
+        """Return a value, as taught where it is a taught frame of the cell."""
+        records = self.world.start.taught_records
+        if records and isinstance(value, Position) and value.numbers in records:
+            return replace(value, taught=True)
+        return value
+
+    def takes_taught(self, expression: ir.Operand | None) -> bool:
+        """Return True if a number is computed from a part of a taught position."""
+        if expression is None or isinstance(expression, ir.Num):
+            return False
+        parts = (one for one in ir.data_in(expression) if one.steps)
+        places = (self.locate(one) for one in parts if not one.name.startswith("$"))
+        held = (self.store.read(key) for place in places for key in place.keys)
+        return any(isinstance(one, Position) and one.taught for one in held)
 
     def read_number(self, expression: ir.Operand | None) -> WrittenNumber:
         """Return a number, and where in the text it is written or comes from."""
@@ -305,7 +322,7 @@ class Execution:
         if name not in ("vec", "pos_shift"):
             for value in values:
                 self.world.pin(value, f"{name.upper()} computes with it")
-        match name, values:
+        match name, [*map(self.find_taught, values)]:
             case "vec", [_, _, _]:
                 x, y, z = (self.real(a) for a in arguments)
                 return Vector((x, y, z))
@@ -424,7 +441,7 @@ def set_owner(here: Execution, name: str, key: str, value: Position) -> Position
     """Say which variable a literal is the value of."""
     declared = here.world.find_declaration(here.place, name)
     shared = value.shared or bool(declared and declared.exported)
-    taught = value.taught or bool(declared and declared.taught)
     owner = value.name or here.world.spell(key)
-    here.world.hold(key, value)
+    taught = value.taught or bool(declared and declared.taught)
+    taught = taught or here.world.is_listed(owner)
     return replace(value, name=owner, shared=shared, taught=taught)

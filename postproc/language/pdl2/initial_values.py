@@ -197,8 +197,8 @@ def _enter_declarations(world: World, place: Place, seen: Variables) -> None:
             value = Nothing(points_of(variable.arm))
         if isinstance(value, Position) and not value.name:
             value = replace(
-                value, name=variable.name, taught=variable.taught,
-                shared=bool(variable.exported),
+                value, name=variable.name, shared=bool(variable.exported),
+                taught=variable.taught or world.is_listed(variable.name),
             )  # fmt: skip
         world.initial[key] = value
 
@@ -225,14 +225,14 @@ def _enter_all(world: World, place: Place, file: VariableFile) -> None:
     marked = _list_rows_where(
         lambda v: v.taught or bool(v.exported), place.program, entries
     )
+    if world.start.taught:
+        taught |= [world.is_listed(name) for name in entries.name]
     for row in marked:
         name = entries.name[row].lower()
         root = root_of(name)
         declared = place.program.variables[root]
-        taught[row], shared[row] = (
-            declared.taught,
-            shared[row] | bool(declared.exported),
-        )
+        taught[row] |= declared.taught
+        shared[row] |= bool(declared.exported)
         if known[row] and declared.exported:
             own[row] = False
             key = world.root(place, root)

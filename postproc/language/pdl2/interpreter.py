@@ -319,7 +319,7 @@ def resolve(
         )  # fmt: skip
         machine = _list_moves(world)
     _keep_exported(world, machine)
-    world.pin_loose()
+    world.pin_loose(machine.given)
     world.settle()
     collector = Pdl2Collector(machine)
     visits = collector.collect()
@@ -365,7 +365,8 @@ def _start(machine: Machine) -> None:
     program, start = world.main, world.start
     store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
-    store.set(**{name: calls.frame_value(getattr(start, name), why) for name in FRAMES})
+    records = {name: getattr(start, name) for name in FRAMES}
+    store.set(**{n: calls.frame_value(start, r, why) for n, r in records.items()})
     if start.linear_speed is not None:
         store.set(lin_spd=start.linear_speed)
     if start.override is not None:

@@ -16,7 +16,12 @@ from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.abstract_state import root_of, wholes
+from postproc.language.pdl2.abstract_state import (
+    NEVER_SET,
+    GivenValues,
+    root_of,
+    wholes,
+)
 from postproc.language.pdl2.entries import NO_ENTRIES, Entries
 from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.pdl2.program import (
@@ -178,7 +183,6 @@ class World:
         diagnostics: What was found; a message is kept once.
         loose: Variables, by key, that are used where it is not known what they hold,
             and how.
-        held: Numbers of the positions that variables, or their parts, ever hold.
         pinned: Numbers (by their index in the job) that say more than where a move
             goes, and what else they are used for: they must stay as they are.
     """
@@ -190,7 +194,6 @@ class World:
     initial: InitialValues = field(default_factory=InitialValues)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     loose: dict[str, str] = field(default_factory=dict)
-    held: dict[str, set[tuple[int, ...]]] = field(default_factory=dict)
     pinned: dict[int, str] = field(default_factory=dict)
     taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
     reached: dict[int, object] = field(default_factory=dict)
@@ -272,9 +275,10 @@ class World:
             for slot in value.of:
                 self.pinned.setdefault(slot, why)
 
-    def hold(self, key: str, value: Position) -> None:
-        """Note that a variable, or a part of it, holds a position at some time."""
-        self.held.setdefault(root_of(key), set()).add(value.slots)
+    def is_listed(self, name: str) -> bool:
+        """Tell whether the cell file says that a point was taught."""
+        taught, name = self.start.taught, name.lower()
+        return bool(taught) and (name in taught or base_variable(name) in taught)
 
     def first_parts(self, key: str) -> list[str]:
         """Return the elements and fields that a key has when the job starts."""
@@ -295,15 +299,18 @@ class World:
         """Note that some part of a variable is used, which only the run tells."""
         self.loose.setdefault(root_of(key), why)
 
-    def pin_loose(self) -> None:
-        """Keep the numbers of all that a loose variable holds at some time."""
+    def pin_loose(self, given: GivenValues) -> None:
+        """Keep the numbers of all that a loose variable holds at some time.
+
+        Args:
+            given: What variables are given at any time.
+        """
         for root, why in self.loose.items():
             for key in (root, *self.first_parts(root)):
-                value = self.initial.find(key)
-                if isinstance(value, Position):
-                    self.hold(key, value)
-            for slots in self.held.get(root, ()):
-                self.pin(Position(slots=slots), why)
+                self.pin(self.initial.find(key) or NEVER_SET, why)
+        for key in given:
+            if why := self.loose.get(root_of(key), ""):
+                self.pin(Nothing(why, given.numbers(key)), why)
 
     def find_declaration(self, place: Place, name: str) -> Variable | None:
         """Return the declaration that a name means."""

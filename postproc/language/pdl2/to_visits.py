@@ -14,7 +14,6 @@ from postproc.language.analysis.to_visits import Arrival, Collector
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.conditions import SettingTable
 from postproc.language.pdl2.entries import Layout
-from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import (
     MOST_AXES,
     Machine,
@@ -121,7 +120,7 @@ class Pdl2Collector(Collector):
         places = zip(c.file[visit].tolist(), c.line[visit].tolist(), strict=True)
         marked = (line in taught[file] for file, line in places)
         c.taught[visit] = [
-            goal.taught or (mark and not goal.name) or self.is_listed(goal.name)
+            goal.taught or (mark and not goal.name)
             for goal, mark in zip(goals, marked, strict=True)
         ]
 
@@ -200,8 +199,6 @@ class Pdl2Collector(Collector):
         names = entries.name.take(row)
         c.name[visit] = c.names.of(names)
         c.taught[visit], c.shared[visit] = points.taught[row], points.shared[row]
-        if self.world.start.taught:
-            c.taught[visit] |= [self.is_listed(name) for name in names]
         written = entries.layout[row]
         for number in written[number_in_order(written)[1]].tolist():
             own = written == number
@@ -281,12 +278,6 @@ class Pdl2Collector(Collector):
                 text = f"auxiliary axis {axis} is a {kind}: it moves arm or part"
                 return Reason(Code.EXTERNAL_AXES, text)
         return NO_REASON
-
-    def is_listed(self, name: str) -> bool:
-        """Tell whether the cell file says that a point was taught."""
-        taught = self.world.start.taught
-        name = name.lower()
-        return name in taught or base_variable(name) in taught
 
 
 def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:

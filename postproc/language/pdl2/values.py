@@ -200,16 +200,16 @@ def compose_frames(a: Position, b: Position) -> Value:
     if a.joints or b.joints or not (a.complete and b.complete):
         return Nothing("a frame in `:` is not known")
     pose = pose_from_record(_array(a)) @ pose_from_record(_array(b))
-    return _derive_position(pose, b.config, "it is composed of two frames (`:`)", b.aux)
+    why, taught = "it is composed of two frames (`:`)", a.taught or b.taught
+    return _derive_position(pose, b.config, why, b.aux, taught)
 
 
 def invert_frame(a: Position) -> Value:
     """Return the inverse frame (POS_INV)."""
     if a.joints or not a.complete:
         return Nothing("the argument of POS_INV is not known")
-    return _derive_position(
-        inverse(pose_from_record(_array(a))), a.config, "it is POS_INV", ()
-    )
+    pose = inverse(pose_from_record(_array(a)))
+    return _derive_position(pose, a.config, "it is POS_INV", (), a.taught)
 
 
 def shift_position(a: Position, by: Vector) -> Value:
@@ -239,9 +239,10 @@ def _derive_position(
     config: str | None,
     why: str,
     aux: tuple[tuple[int, float | None], ...] | None,
+    taught: bool,
 ) -> Position:
     numbers = tuple(record_from_pose(pose).tolist())
-    return Position(False, numbers, config=config, aux=aux, derived=why)
+    return Position(False, numbers, config=config, aux=aux, derived=why, taught=taught)
 
 
 # Operators on values as far as they are known.

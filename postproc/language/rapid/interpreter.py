@@ -307,12 +307,18 @@ class RapidMachine(TaskMachine):
         return self.outside(at, name, here)
 
     def _modes(self, scope: Scope) -> RapidModeReader:
-        """Return what carries out instructions that stand somewhere."""
-        return RapidModeReader(
-            lambda operand: self.task.number(operand, scope),
-            lambda operand: pose_of(self.task.value(operand, scope)),
-            RapidGoal(self.task, scope).load,
-        )  # fmt: skip
+        """Return what carries out instructions that stand somewhere.
+
+        A displacement is not known that was taught, and contains the arm's error.
+        """
+
+        def pose(operand: ir.Operand | None) -> tuple[float, ...]:
+            value = self.task.value(operand, scope)
+            taught = self.task.holds_taught(operand, value, scope)
+            return () if taught else pose_of(value)
+
+        load = RapidGoal(self.task, scope).load
+        return RapidModeReader(lambda x: self.task.number(x, scope), pose, load)
 
     def _move(self, at: At, one: ir.Instruction, here: Arrived) -> Arrived:
         """Record the visits of a move."""

@@ -187,20 +187,11 @@ class RapidGoal(goals.GoalReader):
                 why = replace(why, code=Code.FRAME_UNKNOWN)
             read = TaskFrame((), why)
         else:
-            read = replace(read, taught=self._is_taught(name, found))
+            taught = self.task.holds_taught(named, found, scope)
+            read = replace(read, taught=taught)
         if fixed:
             self.task.frames[key] = read
         return read
-
-    def _is_taught(self, name: str, found: Value | None) -> bool:
-        """Return True if a frame was taught, by the cell or where it is written."""
-        leaves = (one for one in list_leaves(found) if isinstance(one, WrittenNumber))
-        slot = next((one.slot for one in leaves if one.slot >= 0), -1)
-        if slot < 0:
-            return name in self.task.start.taught
-        file = self.task.numbering.file_of(slot)
-        row = self.task.files[file].text.row_of(slot - self.task.numbering.first[file])
-        return self.task.is_taught(name, file, row)
 
     def _is_fixed(self, operand: ir.Operand | None) -> bool:
         """Return True if an operand is data by name that nothing changes."""

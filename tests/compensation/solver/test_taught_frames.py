@@ -97,6 +97,20 @@ def test_targets_in_a_taught_frame_land_on_the_part(tmp_path, taught, job_model)
     assert not any("taught_direction" in d.message for d in outcome.diagnostics)
 
 
+def test_targets_in_a_frame_composed_with_a_taught_one_are_left(
+    tmp_path, taught, job_model
+):
+    joints, record = taught
+    rows = np.round(np.degrees(joints), 6).tolist()
+    text = section(record, f'source = "taught"\ntaught_deg = {rows}')
+    known = with_uframe(tmp_path, "known", text)
+    composed = "$UFRAME := $UFRAME : POS(0, 0, 5, 0, 0, 0, '')"
+    outcome = compensate(program(composed, FIRST, *lines()), known, job_model)
+    assert not (outcome.decisions.status[1:] == Status.CORRECTED).any()
+    whole = compensate(program(FIRST, *lines()), known, job_model)
+    assert (whole.decisions.status == Status.CORRECTED).all()
+
+
 def taught_points(seed, sides, cell):
     """Teach three points of the part from some sides; the controller's frame too."""
     arm, true = virtual_arm(seed), pose_from_record(np.array([TRUE]))[0]

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.language.language import Start
 from postproc.language.visits import ELSEWHERE, ZoneRule
-from tests.language.krl.test_visits import CONFIG, NEW, frame, job, reasons
+from tests.language.krl.test_visits import CONFIG, DATA, NEW, frame, job, reasons
 
 SHIFT = "{X 0,Y 0,Z 5,A 0,B 0,C 0}"
 ON = {
@@ -362,3 +363,100 @@ def test_the_arm_may_be_taken_along_before_another_base_is_set():
     found = job(INIT, "BAS(#TOOL,1)", "PTP XA", f"$BASE=EB({BELT})", "BAS(#BASE,2)",
                 "LIN XP1")  # fmt: skip
     assert found.visits.graph.predecessors(1).tolist() == [ELSEWHERE]
+
+
+ASSIGNED = {
+    "written": ["FR={X 1,Y 2,Z 3,A 0,B 0,C 0}"],
+    "copied": ["FB={X 1,Y 2,Z 3,A 0,B 0,C 0}", "FR=FB"],
+    "in parts": ["FR={X 1,Y 0,Z 0,A 0,B 0,C 0}", "FR.Y=2", "FR.Z=3"],
+    "linked": ["FR={X 1,Y 2,Z 0,A 0,B 0,C 0}:{X 0,Y 0,Z 3,A 0,B 0,C 0}"],
+}
+
+
+@pytest.mark.parametrize("lines", ASSIGNED.values(), ids=ASSIGNED)
+@pytest.mark.parametrize("sets", [["$BASE=FR"], ["BASE_DATA[5]=FR", "BAS(#BASE,5)"]])
+def test_a_frame_that_is_assigned_on_the_way_is_known(lines, sets):
+    found = job("DECL FRAME FR,FB", INIT, "BAS(#TOOL,1)", *lines, *sets, "LIN XP1")
+    assert reasons(found) == [""]
+    np.testing.assert_allclose(places(found)[1], [1, 2, 3], atol=1e-9)
+    ways = [*lines, "IF $IN[1] THEN", "FR.X=7", "ENDIF", *sets]
+    found = job("DECL FRAME FR,FB", INIT, "BAS(#TOOL,1)", *ways, "LIN XP1")
+    assert "FR" in reasons(found)[0] or "BASE_DATA[5]" in reasons(found)[0]
+
+
+def test_a_frame_that_is_made_from_a_taught_one_was_taught():
+    """By the cell, or by a comment where the numbers stand."""
+    marked = CONFIG.replace("Z 500,A 0,B 0,C 0}", "Z 500,A 0,B 0,C 0} ; TAUGHT", 1)
+    by_cell = {"start": Start(taught=frozenset({"base_data"}))}
+    for more in (by_cell, {"config": marked}):
+        lines = "DECL FRAME FR", INIT, "FR=BASE_DATA[2]", "$BASE=FR", "LIN XP1"
+        v = job(*lines, **more).visits
+        assert v.frame.taught[v.frame.uframe[0]]
+
+
+FROM_TABLES = [
+    ["FR=BASE_DATA[4]"],  # it hangs on an external axis
+    ["FR=BASE_DATA[2]", "FR.Z=3"],
+    ["FR=BASE_DATA[2]:{X 1,Y 0,Z 0,A 0,B 0,C 0}"],
+    ["FB=BASE_DATA[2]", "FR=FB", "FR.X=BASE_DATA[4].X"],
+    ["FR=linked( )"],
+    ["V=BASE_DATA[4].X", "FR={X V,Y 0,Z 0,A 0,B 0,C 0}"],
+]
+
+
+@pytest.mark.parametrize("lines", FROM_TABLES)
+def test_a_frame_that_is_computed_from_an_entry_is_left(lines):
+    """Whether it was taught, or hangs on another axis, is that of the entry."""
+    more = (
+        "DEFFCT FRAME linked( )\nRETURN BASE_DATA[4]:{X 1,Y 0,Z 0,A 0,B 0,C 0}\nENDFCT"
+    )
+    declared = "DECL FRAME FR,FB", "DECL REAL V", INIT, "BAS(#TOOL,1)"
+    found = job(*declared, *lines, "$BASE=FR", "LIN XP1", more=more)
+    assert "entry of" in reasons(found)[0] or "MACHINE_FRAME" in reasons(found)[0]
+
+
+def test_a_speed_that_is_assigned_on_the_way_is_known():
+    lines = ["BAS(#TOOL,1)", "BAS(#BASE,2)", "LIN XP1"]
+    found = job("DECL REAL V", INIT, "V=0.25", "$VEL.CP=V", *lines)
+    assert found.visits.speed.linear.tolist() == [0.25]
+
+
+XS2 = ["BAS(#TOOL,1)", "BAS(#BASE,2)", "LIN XS[2]"]
+OTHERS = ["XS[1]=XP1", "XS[1].X=9", "XS[3]=XS[1]", "known_not(XS[1])"]
+
+
+@pytest.mark.parametrize("line", OTHERS)
+def test_an_element_is_known_although_another_one_is_changed(line):
+    found = job(INIT, line, *XS2, more="DEF known_not(P:OUT)\nE6POS P\nP.X=1\nEND\n")
+    assert reasons(found) == [""] and found.visits.target.values[0][0] == 2
+
+
+ANY_ELEMENT = ["XS[K]=XP1", "XS[IX[1]]=XP1", "XS[2].X=9", "known_not(XS[])"]
+
+
+@pytest.mark.parametrize("line", ANY_ELEMENT)
+def test_an_element_that_may_be_changed_is_not_known_behind_it(line):
+    more = "DEF known_not(P[]:OUT)\nE6POS P[]\nP[2].X=1\nEND\n"
+    data = DATA + "INT K\nDECL INT IX[2]\nIX[1]=1"
+    found = job(INIT, "WAIT FOR $IN[1]", line, *XS2, more=more, data=data)
+    assert found.visits.target.values[0][0] != 2
+
+
+def test_the_index_of_an_entry_is_that_of_the_routine_not_of_the_list():
+    """What the list calls N is hidden by a parameter: any entry may be changed."""
+    changes = "DEF put(N:IN)\nINT N\nBASE_DATA[N]={X 1,Y 2,Z 3,A 0,B 0,C 0}\nEND\n"
+    found = job("put(2)", "unknown( )", INIT, *XS2, more=changes)
+    assert "BASE_DATA[2] may be changed" in reasons(found)[0]
+
+
+CELL = (1000.0, 100.0, 500.0, 0.0, 0.0, 0.0)
+CHANGES = ["$BASE.X=5", "$BASE=$BASE:{X 1,Y 0,Z 0,A 0,B 0,C 0}"]
+
+
+@pytest.mark.parametrize("line", CHANGES)
+@pytest.mark.parametrize("taught", [True, False])
+@pytest.mark.parametrize("before", [[], ["$BASE=BASE_DATA[2]"]])
+def test_what_comes_of_a_taught_frame_of_the_cell_was_taught(line, taught, before):
+    start = Start(uframe=CELL, taught_records=[CELL] if taught else [])
+    v = job(*before, line, "LIN XP1", start=start).visits
+    assert v.frame.taught[v.frame.uframe].tolist() == [taught]

@@ -504,6 +504,11 @@ def test_points_that_must_keep_their_numbers():
     assert job("LIN XG").visits.literals.shared.tolist() == [True]
     taught = job("LIN XP1", start=Start(taught=["XP1"])).visits
     assert taught.literals.taught.tolist() == [True]
+    for given in ("XQ=XP1", "XQ=XP1:{X 5,Y 0,Z 0,A 0,B 0,C 0}"):
+        lines = "DECL E6POS XQ", given, "LIN XQ"
+        taught = job(*lines, start=Start(taught=["XP1"])).visits
+        assert taught.literals.taught.tolist() == [True]
+        assert not job(*lines, start=Start(taught=["XP2"])).visits.literals.taught.any()
 
 
 def test_branches_meet():

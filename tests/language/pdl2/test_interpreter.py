@@ -316,11 +316,28 @@ def test_a_part_of_a_frame_is_assigned(line: str, frame: list[float]) -> None:
     assert frames_after(WHOLE, MOVE, line, MOVE) == [[1, 2, 3, 0, 90, 0], frame]
 
 
-def test_a_frame_of_the_cell_may_be_taught_and_is_not_known_with_another_part() -> None:
-    cell = Start(uframe=(1.0, 2.0, 3.0, 0.0, 90.0, 0.0))
-    assert frames_after("$UFRAME.Z := 5", MOVE, start=cell) == [[]]
-    assert frames_after(WHOLE, "$UFRAME.Z := 5", MOVE, start=cell) == [[]]
-    assert frames_after("$UFRAME.Z := 5", MOVE) == [[0, 0, 5, 0, 0, 0]]
+CELL = (1.0, 2.0, 3.0, 0.0, 90.0, 0.0)
+CHANGES = {
+    "a part": ("$UFRAME.Z := 5", [1, 2, 5, 0, 90, 0]),
+    "composed": ("$UFRAME := $UFRAME : POS(0, 0, 2, 0, 0, 0, '')", [3, 2, 3, 0, 90, 0]),
+    "inverted": ("$UFRAME := POS_INV(POS_INV($UFRAME))", list(CELL)),
+}
+
+
+@pytest.mark.parametrize(("line", "frame"), CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize("taught", [True, False])
+@pytest.mark.parametrize("before", [[], [WHOLE]], ids=["start", "written again"])
+def test_what_comes_of_a_taught_frame_of_the_cell_was_taught(
+    line: str, frame: list[float], taught: bool, before: list[str]
+) -> None:
+    cell = Start(uframe=CELL, taught_records=[CELL] if taught else [(0.0,) * 6])
+    text = "\n".join(["PROGRAM a", "BEGIN", *before, line, MOVE, "END a", ""])
+    frames = resolve(
+        parse(source_from_bytes("a.pdl", text.encode())), cell
+    ).visits.frame
+    found = record_from_pose(frames.poses[frames.uframe])
+    np.testing.assert_allclose(found, [frame], atol=1e-9)
+    assert frames.taught[frames.uframe].tolist() == [taught]
 
 
 def test_a_handler_may_assign_a_part_of_a_frame_at_any_time() -> None:
@@ -394,3 +411,45 @@ def test_numbers_that_points_share_are_no_literal_of_any() -> None:
     )
     assert found.visits.target.values[:, 0].tolist() == [7.0, 7.0, 2.0]
     assert found.visits.target.literal.tolist() == [-1, -1, -1]
+
+
+PLACE = "POS(1, 2, 3, 0, 180, 0, '')"
+MADE_FROM = {
+    "it": "$UFRAME := fr",
+    "a copy": "g := fr\n$UFRAME := g",
+    "a shift": "$UFRAME := POS_SHIFT(fr, VEC(0, 0, 5))",
+    "behind another": "$UFRAME := g : fr",
+    "in front of another": "$UFRAME := fr : g",
+    "its inverse": "$UFRAME := POS_INV(fr)",
+    "its numbers": "$UFRAME := POS(fr.X, fr.Y + 1, 3, fr.A, fr.E, fr.R, '')",
+    "a number": "g.X := fr.X\n$UFRAME := g",
+    "a number, set": "$UFRAME := g\n$UFRAME.X := fr.X",
+}
+MARKS = {
+    "by the cell": ("", {"fr"}),
+    "by a comment": (" -- TAUGHT", set[str]()),
+    "not": ("", {"other"}),
+}
+
+
+@pytest.mark.parametrize("lines", MADE_FROM.values(), ids=MADE_FROM)
+@pytest.mark.parametrize("mark", MARKS)
+def test_a_frame_that_is_made_from_a_taught_one_was_taught(
+    lines: str, mark: str
+) -> None:
+    comment, listed = MARKS[mark]
+    start = Start((0,) * 6, (0,) * 6, (0,) * 6, taught=frozenset(listed))
+    text = f"fr := {PLACE}{comment}\ng := {PLACE}\n{lines}\nMOVE LINEAR TO {PLACE}"
+    found = body(text, start, "VAR fr, g : POSITION")
+    frames = found.visits.frame
+    assert reasons(found) == [""]
+    assert frames.taught[frames.uframe[0]] == (mark != "not")
+
+
+@pytest.mark.parametrize("name", ["fr", "tab"])
+def test_a_declared_frame_that_the_cell_lists_was_taught(name: str) -> None:
+    start = Start((0,) * 6, (0,) * 6, (0,) * 6, taught=frozenset({name}))
+    text = f"$UFRAME := fr\nMOVE LINEAR TO {PLACE}"
+    found = body(text, start, f"VAR fr : POSITION ({PLACE})")
+    frames = found.visits.frame
+    assert frames.taught[frames.uframe[0]] == (name == "fr")

@@ -119,6 +119,18 @@ def test_moves_that_a_function_may_make_are_listed_with_their_points():
     assert len(set(v.target.literal.tolist())) == 1  # so that its numbers stay
 
 
+LINES = [[f"again:: MOVE LINEAR TO {AT}"],
+         ["SELECT n OF", f"ELSE: MOVE LINEAR TO {AT}", "ENDSELECT"],
+         ["SELECT n OF", f"CASE (1): MOVE LINEAR TO {AT}", "ENDSELECT"]]  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", LINES, ids=["label", "else", "case"])
+def test_a_move_behind_another_word_of_its_line_is_listed_too(lines: list[str]):
+    head = ["ROUTINE f : INTEGER", "BEGIN", *lines, "RETURN(1)", "END f"]
+    found = resolved(program("job", ["VAR n : INTEGER", *head], ["n := f"]))
+    assert len(found.visits) == 1 and not found.missed
+
+
 def test_a_point_given_to_a_function_keeps_its_numbers():
     head = ["ROUTINE f(a : POSITION) : INTEGER", "BEGIN", "MOVE LINEAR TO a"]
     head += ["RETURN(1)", "END f"]

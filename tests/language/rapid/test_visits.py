@@ -490,6 +490,17 @@ def test_what_was_taught_is_known_by_the_cell_or_a_comment():
     assert taught(task(inline, inline + " ! taught", L.format("p1"))) == [0, 1, 0]
 
 
+@pytest.mark.parametrize("given", ["q:=p1;", "q:=Offs(p1,0,0,5);", "r:=p1;q:=r;"])
+@pytest.mark.parametrize("name", ["p1", "p2", "pos"])
+def test_a_point_that_the_cell_lists_is_taught_by_any_name(given, name):
+    data = DATA + "\nLOCAL VAR robtarget q; LOCAL VAR robtarget r;"
+    listed = Start(taught=(name,))
+    assert taught(task(given, L.format("q"), data=data, start=listed)) == [name == "p1"]
+    copy = "q:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];r:=q;"
+    listed = Start(taught=("q" if name == "p1" else name,))
+    assert taught(task(copy, L.format("r"), data=data, start=listed)) == [name == "p1"]
+
+
 def test_frames_that_were_taught():
     def frames(found):
         v = found.visits
@@ -502,6 +513,39 @@ def test_frames_that_were_taught():
     lines = DATA.splitlines()
     lines[1] += " ! TAUGHT"
     assert frames(task(L.format("p1"), data="\n".join(lines))) == (True, False)
+
+
+SET_W2 = 'w2:=[FALSE,TRUE,"",[[0,0,5],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+COPIES = {
+    "whole": "w2:=w;",
+    "then changed": "w2:=w; w2.uframe.trans.x:=0;",
+    "in part": 'w2:=[FALSE,TRUE,"",w.uframe,[[0,0,0],[1,0,0,0]]];',
+    "a component": f"{SET_W2} w2.uframe:=w.uframe;",
+}
+
+
+@pytest.mark.parametrize("copy", COPIES.values(), ids=COPIES)
+@pytest.mark.parametrize("by_cell", [True, False])
+def test_a_frame_that_is_made_from_a_taught_one_was_taught(copy, by_cell):
+    lines = DATA.splitlines()
+    lines[2] += "" if by_cell else " ! TAUGHT"
+    data = "\n".join([*lines, "LOCAL VAR wobjdata w2;"])
+    start = Start(taught=frozenset({"w"} if by_cell else ()))
+    go = L.format("p1").replace(":=w;", ":=w2;")
+    found = task(copy, go, data=data, start=start)
+    v = found.visits
+    assert reasons(found) == [""] and v.frame.taught[v.frame.uframe[0]]
+    own = task(SET_W2, go, data=data, start=start).visits
+    assert not own.frame.taught[own.frame.uframe[0]]
+
+
+@pytest.mark.parametrize("given", ["w.oframe", "d"])
+@pytest.mark.parametrize("name", ["w", "d", "t"])
+def test_a_displacement_that_was_taught_is_not_known(given, name):
+    data = DATA + "\nCONST pose d:=[[0,0,7],[1,0,0,0]];"
+    lines = f"PDispSet {given};", L.format("p1")
+    found = task(*lines, data=data, start=Start(taught=frozenset({name})))
+    assert bool(reasons(found)[0]) == (name == given[0])
 
 
 def test_measured_moves_carry_their_ids():
