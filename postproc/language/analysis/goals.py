@@ -10,10 +10,12 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any, ClassVar, TypeVar
 
+from postproc.arrays import Bools, Floats
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import AssignedPoint, Scope
 from postproc.language.analysis.found_goals import FoundGoal, FoundShift, hold_numbers
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.pose_encoding import Dialect
@@ -62,6 +64,8 @@ class GoalReader(ABC):
         shout: Names are upper case in messages.
         system: Why numbers of files that are not rewritten must stay.
         outlives: Why those stay that data of no routine are given, "" if they need not.
+        told_apart: Numbers of targets, by their place, that tell moves apart which are
+            read at once.
     """
 
     task: TaskSymbols[Any]
@@ -71,6 +75,7 @@ class GoalReader(ABC):
     shout: ClassVar[bool] = False
     system: ClassVar[str]
     outlives: ClassVar[str] = ""
+    told_apart: ClassVar[Sequence[int]] = ()
 
     # What a language says.
 
@@ -100,6 +105,21 @@ class GoalReader(ABC):
             name: Of the point.
             slot: Its first number, -1 where none is written.
         """
+
+    @staticmethod
+    @abstractmethod
+    def slots_of(operand: ir.Operand | None) -> TargetSlots | None:
+        """Return the numbers of a written target, None for all other operands."""
+
+    @staticmethod
+    @abstractmethod
+    def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+        """Tell which numbers, (m, w), are those of a target, (m,)."""
+
+    @staticmethod
+    @abstractmethod
+    def read_aux(task: Any, numbers: Floats) -> Floats:
+        """Return external axes as they count, (m, 6), by their numbers, likewise."""
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read what only this language can go to, None for all else."""
@@ -227,18 +247,20 @@ class GoalReader(ABC):
         steps = operand.steps if isinstance(operand, ir.DataObject) else ()
         spelt = ""
         for step in steps:
-            inside = self._spell_index(self._index(step) or ())
+            inside = self.spell_index(self._index(step) or ())
             spelt += f".{step}" if isinstance(step, str) else inside
         return spelt
 
-    def _spell_index(self, index: tuple[int, ...]) -> str:
-        return f"{self.brackets[0]}{','.join(map(str, index))}{self.brackets[1]}"
+    @classmethod
+    def spell_index(cls, index: tuple[int, ...]) -> str:
+        """Spell the index of an element."""
+        return f"{cls.brackets[0]}{','.join(map(str, index))}{cls.brackets[1]}"
 
     # What assignments gave.
 
     def _read_held(self, held: AssignedPoint) -> FoundGoal:
         """Read the destination that assignments gave to a point."""
-        name = held.name + (self._spell_index(held.index) if held.index else "")
+        name = held.name + (self.spell_index(held.index) if held.index else "")
         goal = held.goal or self.unknown(AT_RUN_TIME)
         goal = replace(goal, names=goal.names | held.names)
         why = []

@@ -30,7 +30,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoal, own_numbers
+from postproc.language.krl.moves import KrlGoal, plain_end
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -87,6 +87,7 @@ class KrlMachine(TaskMachine):
     procedures = ("def",)
     reader = KrlGoal
     still = STILL | FUNCTIONS
+    ends_apart = True
     passed = (ir.Declaration,)
     acting = (
         ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -120,20 +121,24 @@ class KrlMachine(TaskMachine):
         """Return True for moves."""
         return isinstance(one, said.KrlMove)
 
-    def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
-        """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
-        return own_numbers(one) if isinstance(one, said.KrlMove) else None
+    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
+        """Return where a plain move goes, see `TaskMachine.plain_end`."""
+        return plain_end(one) if isinstance(one, said.KrlMove) else None
 
-    def apart(self, context: Context) -> set[int] | None:
-        """Return the points of splines; all where an interrupt may end any move.
+    def planner_of(self, one: ir.SourceStatement) -> str:
+        """Return the planner of a move: they do not blend into each other."""
+        spline = isinstance(one, said.KrlMove) and one.word.startswith("s")
+        return "spline" if spline else "path"
 
-        All of a system file, too, where numbers stay.
-        """
+    def reads_at_once(self, context: Context) -> bool:
+        """Return False where an interrupt may end any move, or in a system file."""
         file = self.task.files[context.place.scope.file]
-        if self._has_interrupts or file.is_system:
-            return None
-        blocks = file.splines
-        return {row for rows in blocks for row in rows}
+        alone = self._has_interrupts or file.is_system
+        return super().reads_at_once(context) and not alone
+
+    def list_apart(self, file: int) -> set[int]:
+        """Return the points of splines."""
+        return {row for rows in self.task.files[file].splines for row in rows}
 
     def counts_alone(self, at: At, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
@@ -20,7 +21,8 @@ from postproc.language.analysis.found_goals import (
     hold_numbers,
     not_reached,
 )
-from postproc.language.analysis.symbols import whole
+from postproc.language.analysis.move_blocks import TargetSlots
+from postproc.language.analysis.symbols import LARGEST, whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl import syntax as said
@@ -49,6 +51,7 @@ SPLINE = Reason(
     Code.ENDS_ELSEWHERE,
     "a point of a spline of joint moves: how the arm goes there is not known",
 )
+_SOUND_STATUS = pose_encoding.MEASURED  # values of S from here on may be odd
 _ALONE = ("ptp", "lin", "circ", "sptp", "slin", "scirc")
 # Words of moves that are known in no spline block, in one of paths, in one of joints.
 _POINTS = {
@@ -141,22 +144,10 @@ def motion_of(word: str) -> Motion:
     return Motion.JOINT if stem.startswith("ptp") else Motion.LINEAR
 
 
-def own_numbers(move: said.KrlMove) -> list[int] | None:
-    """Return which numbers of a line to a written point are its X, Y, Z, A, B, C.
-
-    None for moves of another kind, and for those that are more than numbers.
-    """
-    to = move.to
-    alone = move.via is None and move.angle is None and not move.settings
-    if move.word not in ("lin", "slin") or not alone:
-        return None
-    if not isinstance(to, said.KrlAggregate):
-        return None
-    slots = {one.name: one.value.slot for one in to.fields
-             if isinstance(one.value, ir.Num)}  # fmt: skip
-    if len(slots) != len(to.fields) or not slots.keys() >= {*PLACE}:
-        return None
-    return [slots[name] for name in PLACE]
+def plain_end(move: said.KrlMove) -> ir.Operand | None:
+    """Return where a move goes that does nothing else, None for all others."""
+    plain = move.word in ("ptp", "lin", "sptp", "slin") and not move.settings
+    return move.to if plain and move.via is None and move.angle is None else None
 
 
 @dataclass(frozen=True)
@@ -169,6 +160,7 @@ class KrlGoal(goals.GoalReader):
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
     outlives = "stands in a data list: it outlives the run"
+    told_apart = (6, 7)  # S and T
 
     # Moves.
 
@@ -238,6 +230,38 @@ class KrlGoal(goals.GoalReader):
         return move, shared
 
     # Points.
+
+    @staticmethod
+    def slots_of(operand: ir.Operand | None) -> TargetSlots | None:
+        """Return the numbers of a written target, see `GoalReader.slots_of`."""
+        fields = operand.fields if isinstance(operand, said.KrlAggregate) else ()
+        slots = {f.name: f.value.slot for f in fields if isinstance(f.value, ir.Num)}
+        outside = tuple(slots.get(name, -1) for name in symbols.OUTSIDE)
+        for names, needed in ((pose_encoding.COMPONENTS, PLACE), (symbols.AXES,) * 2):
+            own = slots.keys() <= {*names, *symbols.OUTSIDE}
+            if own and slots.keys() >= {*needed} and len(slots) == len(fields):
+                found = [slots.get(name, -1) for name in names]
+                found += [-1] * (pose_encoding.WIDTH - len(found))
+                return TargetSlots(tuple(found), outside)
+        return None
+
+    @staticmethod
+    def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+        """Tell which targets are angles, or a place with S and T that say something."""
+        found = all_in_rows(np.isfinite(numbers[:, np.array(target.slots) >= 0]))
+        for column, slot in enumerate(target.slots[6:], start=6):
+            flags = np.where(found, numbers[:, column], -1.0)
+            if slot >= 0:
+                found &= (flags >= 0.0) & (flags == np.floor(flags))
+                found &= flags < (_SOUND_STATUS if column == 6 else LARGEST)
+        return found
+
+    @staticmethod
+    def read_aux(task: symbols.KrlTask, numbers: Floats) -> Floats:
+        """Return the external axes that count, see `_outside`."""
+        declared = [axis in task.start.aux for axis in range(1, 7)]
+        found: Floats = np.where((numbers != 0.0) | declared, numbers, np.nan)
+        return found
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read home positions, where the arm is, and products of frames."""

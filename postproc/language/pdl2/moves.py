@@ -12,6 +12,7 @@ from postproc.language.analysis.origins import NOWHERE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import Settings
 from postproc.language.pdl2.evaluate import SINGLE, Execution, parts_under
+from postproc.language.pdl2.job import World, base_variable
 from postproc.language.pdl2.machine import (
     MOST_AXES,
     NO_AXES,
@@ -265,6 +266,23 @@ _FROM_HERE = frozenset(
     {Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
      Meaning.AWAY, Meaning.ABOUT, Meaning.BY, Meaning.FOR}
 )  # fmt: skip
+
+
+def read_move(here: Execution, statement: ast.Move) -> Pdl2Visit:
+    """Read a move of our arm that nothing but its target tells from others."""
+    settings = _with(here, statement)
+    motion, reason = motion_of(here, statement, settings)
+    goal, why = goal_of(here, statement, motion), here.reason or reason
+    return Pdl2Visit(
+        here.place, motion, False, goal, settings, why=why, at=here.row,
+        fly=statement.fly,
+    )  # fmt: skip
+
+
+def is_listed(world: World, name: str) -> bool:
+    """Tell whether the cell file says that a point was taught."""
+    name = name.lower()
+    return name in world.start.taught or base_variable(name) in world.start.taught
 
 
 def move(machine: Machine, here: Execution, statement: ast.Move) -> None:

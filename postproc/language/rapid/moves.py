@@ -20,6 +20,7 @@ from postproc.language.analysis.found_goals import (
     FoundVisit,
     not_reached,
 )
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.values import (
     Value,
     WrittenNumber,
@@ -294,6 +295,27 @@ class RapidGoal(goals.GoalReader):
             return super().read_point(operand)
         return self.name_goal(goal, name) if name else goal
 
+    @staticmethod
+    def slots_of(operand: ir.Operand | None) -> TargetSlots | None:
+        """Return the numbers of a written target, see `GoalReader.slots_of`."""
+        own = _plain_slots(operand) if isinstance(operand, ir.Composite) else []
+        numbers, outside = own[:-6], own[-6:]
+        filled = (*numbers, *(-1,) * (WIDTH - len(numbers)))
+        return TargetSlots(filled, tuple(outside)) if own else None
+
+    @staticmethod
+    def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+        """Tell which targets are joint angles, or a place and a rotation."""
+        known = all_in_rows(np.isfinite(numbers[:, np.array(target.slots) >= 0]))
+        turned: Bools = (numbers[:, 3:7] ** 2).sum(axis=1) > SHORTEST**2
+        return known if target.slots[6] < 0 else known & turned
+
+    @staticmethod
+    def read_aux(task: RapidTask, numbers: Floats) -> Floats:
+        """Return the external axes that there are."""
+        found: Floats = np.where(np.abs(numbers) > UNUSED, np.nan, numbers)
+        return found
+
     def _read_written(
         self, written: ir.Composite, file: int, row: int
     ) -> FoundGoal | None:
@@ -403,30 +425,21 @@ def _is_unit(q: Sequence[float]) -> bool:
     return sum(c * c for c in q) > SHORTEST**2
 
 
-def are_targets(numbers: Floats) -> Bools:
-    """Tell which x, y, z, q1 to q4, (m, 7), are a place and a rotation, (m,)."""
-    turned: Bools = (numbers[:, 3:] ** 2).sum(axis=1) > SHORTEST**2
-    return turned & all_in_rows(np.isfinite(numbers))
-
-
-def own_numbers(one: ir.Instruction) -> list[int] | None:
-    """Return which numbers of ``MoveL [[..], ..], ..`` are its place and rotation.
-
-    None for other instructions, and where anything else is more than a name or number.
-    """
-    if one.name != "movel" or not one.arguments:
+def plain_end(one: ir.Instruction) -> ir.Operand | None:
+    """Return where a move goes that does nothing else, None for all other lines."""
+    signature = MOTIONS.get(one.name)
+    if signature is None or signature.via >= 0 or not signature.reaches:
         return None
-    to, *others = (argument.value for argument in one.arguments)
+    to, _ = signature.operands(one.arguments)
+    others = (a.value for a in one.arguments if a.value is not to)
     simple = (
         value is None
         or isinstance(value, ir.Num)
         or (isinstance(value, ir.DataObject) and not value.steps)
         for value in others
     )
-    if not isinstance(to, ir.Composite) or not all(simple):
-        return None
-    slots = _plain_slots(to)
-    return slots[:7] if len(slots) == 17 else None
+    passed_on = any(argument.passed_on for argument in one.arguments)
+    return to if all(simple) and not passed_on else None
 
 
 _COUNTS: tuple[tuple[int, ...], ...] = (

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.language.analysis import move_runs
-from postproc.language.analysis.move_runs import rows_of_lines
+from postproc.language.analysis import move_blocks
+from postproc.language.analysis.move_blocks import rows_of_lines
 from postproc.language.analysis.visit_columns import chain_visits
 from postproc.language.rapid.program import read_statements
 from postproc.language.text.source import Source
@@ -41,7 +41,7 @@ def read(
 ) -> Visits:
     """Read a program; runs of `least` moves are read at once."""
     with patch.context() as one:
-        one.setattr(move_runs, "LEAST", least)
+        one.setattr(move_blocks, "LEAST", least)
         return read_program(files, cell).visits
 
 

@@ -1,0 +1,297 @@
+"""Blocks of moves of a task: where they go, and which arrivals stand for many."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints, chunks
+from postproc.language import ir
+from postproc.language.analysis.assigned_points import Points, Scope
+from postproc.language.analysis.call_context import At, Context
+from postproc.language.analysis.found_goals import FoundVisit
+from postproc.language.analysis.goals import GoalReader
+from postproc.language.analysis.move_blocks import (
+    MoveBlock,
+    PlainMove,
+    PlainMoves,
+    Runs,
+    TargetSlots,
+    choose_examples,
+    find_plain,
+    find_runs,
+    find_sound,
+    numbers_at,
+    rows_of_lines,
+)
+from postproc.language.analysis.symbols import TaskSymbols, whole
+from postproc.language.text.symbol_column import NameColumn
+
+if TYPE_CHECKING:
+    from postproc.language.analysis.task_machine import TaskMachine
+
+ALONE = -1  # kind of a target that is read by itself
+
+
+@dataclass(frozen=True)
+class PointKind:
+    """What targets have in common that are written alike.
+
+    Attributes:
+        file: The file that they are written in.
+        target: Which numbers of their statements they are.
+        shared: Other programs may read them too.
+    """
+
+    file: int
+    target: TargetSlots
+    shared: bool = False
+
+
+@dataclass
+class Targets:
+    """Where k moves go.
+
+    Attributes:
+        variant: The variant of each move, (k,).
+        kind: The kind of each target, (k,), or `ALONE`.
+        origin: First number of the statement that it is written in, (k,).
+        names: What each is called, k, "" where it is written in the move.
+    """
+
+    variant: Ints
+    kind: Ints
+    origin: Ints
+    names: list[str]
+
+
+@dataclass
+class TaskBlocks:
+    """The blocks of moves of a task, found when they are first come to.
+
+    Attributes:
+        task: What its names mean.
+        reader: Reads where its moves lead.
+        kinds: Kinds of targets, by number.
+    """
+
+    task: TaskSymbols[Any]
+    reader: type[GoalReader]
+    kinds: list[PointKind] = field(default_factory=list)
+    _number: dict[PointKind, int] = field(default_factory=dict)
+    _plain: dict[int, PlainMoves] = field(default_factory=dict)
+    _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
+    _points: dict[tuple[object, ...], tuple[int, int]] = field(default_factory=dict)
+    _slots: dict[int, tuple[ir.Operand, TargetSlots | None]] = field(
+        default_factory=dict
+    )
+
+    def runs_of(self, machine: TaskMachine, context: Context) -> Runs:
+        """Return which moves are read at once in a call, or a round of a loop.
+
+        They are found in the statements of a routine once for all calls of it.
+        """
+        place = context.place
+        key = place.scope.file, place.flow.first
+        if not machine.reads_at_once(context):
+            return {}
+        if key not in self._runs:
+            plain = self._find_plain(machine, place.scope.file)
+            flow, ends = place.flow, machine.ends_apart
+            own = plain.variant[flow.first : flow.last]
+            self._runs[key] = find_runs(flow.first, flow.joins, plain, own, ends)
+        return self._runs[key]
+
+    def _find_plain(self, machine: TaskMachine, file: int) -> PlainMoves:
+        if file not in self._plain:
+
+            def read(one: ir.SourceStatement) -> PlainMove | None:
+                end, planner = machine.plain_end(one), machine.planner_of(one)
+                return PlainMove.to(end, self.reader.slots_of, planner)
+
+            sound, text = self.reader.are_sound, self.texts[file]
+            apart = rows_of_lines(text, self.task.taught_lines[file])
+            apart |= machine.list_apart(file)
+            self._plain[file] = find_plain(text, read, sound, apart)
+        return self._plain[file]
+
+    @property
+    def texts(self) -> Sequence[Any]:
+        """The statements of all files."""
+        return self.task.numbering.texts
+
+    # What a block stands for.
+
+    def read(self, machine: TaskMachine, at: At, behind: int, here: Any) -> MoveBlock:
+        """Read the moves of a block.
+
+        Args:
+            machine: It follows the task.
+            at: The first of them.
+            behind: The row behind the last.
+            here: How the arm comes to it.
+        """
+        rows = np.arange(at.row, behind)
+        targets = self._find_targets(at.place.scope, rows, here.points)
+        examples, group, first = choose_examples(
+            self._tell_apart(targets), targets.kind == ALONE,
+            lambda k: _read_one(machine, at, int(rows[k]), here),
+            lambda k: self._slots_at(targets, k),
+        )  # fmt: skip
+        origin, some = targets.origin, any(targets.names)
+        return MoveBlock(
+            examples[0].scope, examples[0].motion, False, examples[0].goal, here.modes,
+            count=len(rows), points=here.points, at_once=rows, examples=examples,
+            group=group, offset=origin - origin[first][group],
+            names=NameColumn(targets.names) if some else None,
+            aux=self._read_aux(targets, examples, group),
+        )  # fmt: skip
+
+    def _slots_at(self, targets: Targets, k: int) -> tuple[int, ...]:
+        """Return the numbers of the job that a target is written in."""
+        kind = self.kinds[targets.kind[k]]
+        begin = int(targets.origin[k]) + self.task.numbering.first[kind.file]
+        return tuple(begin + at if at >= 0 else -1 for at in kind.target.slots)
+
+    def _tell_apart(self, targets: Targets) -> list[Ints]:
+        """Return what tells moves apart of which one cannot stand for the other."""
+        columns = [targets.variant, targets.kind]
+        for at in self.reader.told_apart:
+            own = np.zeros(len(targets.kind))
+            for mine, text, target in self._by_kind(targets.kind):
+                begin = targets.origin[mine]
+                own[mine] = numbers_at(text, begin, target.slots[at : at + 1])[:, 0]
+            columns.append(own.view(np.int64))
+        return columns
+
+    def _read_aux(
+        self, targets: Targets, examples: Sequence[FoundVisit], group: Ints
+    ) -> Floats | None:
+        """Return external axes of moves, None where those of the examples are alike."""
+        found, given = None, np.array([one.goal.aux for one in examples])
+        read, task = self.reader.read_aux, self.task
+        for mine, text, target in self._by_kind(targets.kind):
+            for some in (mine[k] for k in chunks(len(mine))):
+                aux = read(task, numbers_at(text, targets.origin[some], target.aux))
+                if found is None:
+                    if np.array_equal(aux, given[group[some]], equal_nan=True):
+                        continue
+                    found = given[group]
+                found[some] = aux
+        return found
+
+    def _by_kind(self, kind: Ints) -> Iterator[tuple[Ints, Any, TargetSlots]]:
+        """Yield the moves of each kind, and the text that says where they go, and how.
+
+        Args:
+            kind: The kind of each move, (k,).
+        """
+        for number in np.unique(kind[kind != ALONE]).tolist():
+            own = self.kinds[number]
+            text = self.texts[own.file]
+            yield np.flatnonzero(kind == number), text, own.target
+
+    # Where moves go.
+
+    def _find_targets(self, scope: Scope, rows: Ints, points: Points) -> Targets:
+        """Find where moves go, and which of them are read by themselves."""
+        text, plain = self.texts[scope.file], self._plain[scope.file]
+        variant, kind = plain.variant[rows], np.full(len(rows), ALONE, dtype=np.int64)
+        found = Targets(variant, kind, text.first[rows].astype(np.int64), [])
+        hidden = {key[0][-1] for key in points.held}.union(scope.parameters)
+        hidden |= {*dict(scope.loops)}.union(one[0] for one in scope.given)
+        for number in np.unique(variant).tolist():
+            move, mine = plain.moves[number], np.flatnonzero(variant == number)
+            if move.target is not None:
+                kind[mine] = self._number_of(PointKind(scope.file, move.target))
+            else:
+                found.names = found.names or [""] * len(rows)
+                self._find_named(scope, rows[mine], mine, move, hidden, found)
+        for mine, other, target in self._by_kind(kind):
+            test = self.reader.are_sound
+            kind[mine[~find_sound(other, found.origin[mine], target, test)]] = ALONE
+        return found
+
+    def _find_named(
+        self, scope: Scope, rows: Ints, mine: Ints, move: PlainMove,
+        hidden: Collection[str], found: Targets,
+    ) -> None:  # fmt: skip
+        """Find the points that moves of one variant go to.
+
+        Args:
+            scope: Where they stand.
+            rows: The moves, (m,).
+            mine: Where they are in `found`, (m,).
+            move: What they have in common.
+            hidden: Names that are something else there, or have been given a value.
+            found: What is filled.
+        """
+        text, plain = self.texts[scope.file], self._plain[scope.file]
+        own = plain.name[rows]
+        names: Sequence[str] = [move.name] * len(rows)
+        if own[0] >= 0:
+            names = [*text.shapes.names.take(own.astype(np.int64)).lower()]
+        numbers = numbers_at(text, text.first[rows], move.index).tolist()
+        spell = self.reader.spell_index
+        for k, name, number in zip(mine.tolist(), names, numbers, strict=True):
+            index = tuple([whole(x) or 0 for x in number])
+            key = *scope.place, name, index
+            if key not in self._points:
+                self._points[key] = self._find_point(name, index, scope)
+            found.names[k] = name + spell(index) if index else name
+            if name not in hidden:
+                found.kind[k], found.origin[k] = self._points[key]
+
+    def _find_point(
+        self, name: str, index: tuple[int, ...], scope: Scope
+    ) -> tuple[int, int]:
+        """Find a point that is written in numbers and holds them as long as it runs.
+
+        Returns:
+            Its kind, `ALONE` for all others; the first number of its statement.
+        """
+        task, reader = self.task, self.reader(self.task, scope)
+        apart = task.apart and bool(index)
+        found = task.constant(name, scope, index if apart else ())
+        if found is None or reader.read_special(ir.DataObject(name)) is not None:
+            return ALONE, 0
+        (file, datum), operand = found, found[1].value
+        for at in () if apart else index:
+            items = operand.items if isinstance(operand, ir.Composite) else ()
+            operand = items[at - 1] if 0 < at <= len(items) else None
+        target = self._slots_of(operand)
+        if target is None or task.files[file].is_system:
+            return ALONE, 0
+        origin = int(task.files[file].text.first[datum.row])
+        slot = task.numbering.first[file] + origin + target.slots[0]
+        marked = name in task.start.taught or bool(task.taught_lines[file])
+        marked = marked and task.is_taught(name, file, datum.row)
+        if marked or reader.explain_pinned(name, slot):
+            return ALONE, 0
+        whole_datum = task.datum(name, scope)
+        shared = whole_datum is not None and whole_datum[1].scope == "global"
+        return self._number_of(PointKind(file, target, shared)), origin
+
+    def _slots_of(self, operand: ir.Operand | None) -> TargetSlots | None:
+        """Read a value once for all statements of a form."""
+        key = id(operand)
+        if operand is not None and key not in self._slots:
+            self._slots[key] = operand, self.reader.slots_of(operand)
+        return None if operand is None else self._slots[key][1]
+
+    def _number_of(self, kind: PointKind) -> int:
+        if kind not in self._number:
+            self._number[kind] = len(self.kinds)
+            self.kinds.append(kind)
+        return self._number[kind]
+
+
+def _read_one(machine: TaskMachine, at: At, row: int, here: Any) -> FoundVisit:
+    """Read a move of a block by itself."""
+    statement, scope = at.place.statement(row), replace(at.place.scope, row=row)
+    (found,) = machine.read_visits(statement, scope, here)
+    one: FoundVisit = found
+    return one
