@@ -5,14 +5,16 @@ import re
 import sys
 import tracemalloc
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.compensation.program import read_program
+from postproc.language.analysis import to_visits
 from postproc.language.krl import files as krl_files
 from postproc.language.text.statement_table import StatementText
-from tests.bench.languages import lengthened, milled, written
+from tests.bench.languages import FLY, lengthened, milled, written
 from tests.language.neutral_job import LANGUAGES
 
 ONCE, MORE = 4_000, 9  # moves, and times
@@ -110,3 +112,59 @@ def test_twice_the_taught_moves_take_twice_the_calls(bench_cell):
     counts = [calls_of(lambda job=job: read_program(job, bench_cell))
               for job in (half, whole)]  # fmt: skip
     assert counts[1] < 2.3 * counts[0]
+
+
+class CountedArrays:
+    """numpy, which counts the elements that its functions take and give.
+
+    Attributes:
+        elements: How many there were.
+    """
+
+    def __init__(self) -> None:
+        self.elements = 0
+
+    def __getattr__(self, name):
+        made = getattr(np, name)
+        if isinstance(made, type) or not callable(made) or name == "searchsorted":
+            return made  # that one takes the logarithm
+
+        def counted(*given, **options):
+            found = made(*given, **options)
+            sized = (one for one in (*given, found) if not isinstance(one, type))
+            self.elements += sum(map(np.size, sized))
+            return found
+
+        return counted
+
+
+def measured(jobs, name, n):
+    """Take the first moves of a program; each is measured, and none is like another."""
+    comment = {"job.pdl": "--", "job.mod": "!", "job.src": ";"}[name]
+    halt = {"job.pdl": "PAUSE", "job.mod": "Break;", "job.src": "HALT"}[name]
+    files = jobs[name][0]
+    moves = [*FLY.finditer(files[name])]
+    own = [f"{comment} MEASURE h{k}\n{move[0].decode()}\n{halt}\n"
+           for k, move in enumerate(moves[:n])]  # fmt: skip
+    begin, end = moves[0].start(), moves[-1].end() + 1
+    text = files[name][:begin] + "".join(own).encode() + files[name][end:]
+    return {**files, name: text}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_twice_the_measured_moves_are_twice_the_work(
+    name, jobs, bench_cell, monkeypatch
+):
+    """Functions of arrays are few, whatever they take: their elements count."""
+    work = []
+    for n in (200, 400):
+        arrays, files = CountedArrays(), measured(jobs, name, n)
+        monkeypatch.setattr(to_visits, "np", arrays)
+        calls = calls_of(lambda files=files: read_program(files, bench_cell))
+        monkeypatch.undo()
+        visits = read_program(files, bench_cell).visits
+        assert sum(map(bool, visits.place.measure_id)) == n
+        work.append((calls, arrays.elements))
+    (few, small), (many, large) = work
+    assert many < 2.2 * few
+    assert large < 2.2 * small
