@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -33,6 +32,15 @@ class TargetSlots:
 
     slots: tuple[int, ...]
     aux: tuple[int, ...] = ()
+
+    def relative(self) -> TargetSlots:
+        """Return them by their distance to the first of all."""
+        first = min(self.every)
+        slots, aux = (
+            tuple([at - first if at >= 0 else -1 for at in some])
+            for some in (self.slots, self.aux)
+        )
+        return TargetSlots(slots, aux)
 
     @property
     def every(self) -> frozenset[int]:
@@ -141,17 +149,15 @@ def find_plain(
     sought = plain[form] if plain.any() else np.zeros(len(form), dtype=bool)
     sought[[*apart]] = False
     rows = np.flatnonzero(sought)
-    order = rows[np.argsort(form[rows], kind="stable")]
-    cuts = np.flatnonzero(np.diff(form[order], prepend=-1, append=-1))
-    for a, b in pairwise(cuts.tolist()):
-        own, move = order[a:b], read_forms[int(form[order[a]])]
+    for number, at in split_by(form[rows]):
+        own, move = rows[at], read_forms[number]
         assert move is not None
         if move.target is not None:
             own = own[find_sound(text, text.first[own], move.target, are_sound)]
         if len(own):
-            number, name[own] = _tell_apart(text, own, move)
-            variant[own] = len(moves) + number
-            moves += [move] * (int(number.max()) + 1)
+            several, name[own] = _tell_apart(text, own, move)
+            variant[own] = len(moves) + several
+            moves += [move] * (int(several.max()) + 1)
     return PlainMoves(moves, variant, name)
 
 
@@ -298,8 +304,16 @@ class MoveBlock(FoundVisit):
     @property
     def members(self) -> Sequence[Ints]:
         """The moves that each example stands for, by their place among these."""
-        order = np.argsort(self.group, kind="stable")
-        return np.split(order, np.cumsum(np.bincount(self.group))[:-1])
+        return [own for _, own in split_by(self.group)]
+
+
+def split_by(values: Ints | Indices) -> Iterator[tuple[int, Ints]]:
+    """Yield each of some values, ascending, and where it stands, (m,)."""
+    order = np.argsort(values, kind="stable")
+    ascending = values[order]
+    cuts = np.flatnonzero(np.diff(ascending)) + 1
+    for own in np.split(order, cuts) if len(order) else ():
+        yield int(values[own[0]]), own
 
 
 def choose_examples(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,14 +26,34 @@ from postproc.language.analysis.move_blocks import (
     find_sound,
     numbers_at,
     rows_of_lines,
+    split_by,
 )
-from postproc.language.analysis.symbols import TaskSymbols, whole
+from postproc.language.analysis.symbols import TaskSymbols, element_of, whole
 from postproc.language.text.symbol_column import NameColumn
 
-if TYPE_CHECKING:
-    from postproc.language.analysis.task_machine import TaskMachine
-
 ALONE = -1  # kind of a target that is read by itself
+
+
+class MoveReader(Protocol):
+    """What a machine knows of the moves that it follows."""
+
+    @property
+    def ends_apart(self) -> bool:
+        """Whether the first and the last of a block are read by themselves."""
+
+    def reads_at_once(self, context: Context) -> bool:
+        """Return True if moves in a call, or a round of a loop, are read at once."""
+
+    def list_apart(self, file: int) -> set[int]:
+        """Return the rows of moves that are read by themselves."""
+
+    def planner_of(self, one: Any) -> str:
+        """Return what plans a move, where there are several that tell moves apart."""
+
+    def read_visits(
+        self, one: ir.SourceStatement, scope: Scope, here: Any
+    ) -> Iterable[Any]:
+        """Read the visits of a move, nothing for all else."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +72,7 @@ class PointKind:
 
 
 @dataclass
-class Targets:
+class BlockTargets:
     """Where k moves go.
 
     Attributes:
@@ -81,15 +101,16 @@ class TaskBlocks:
     task: TaskSymbols[Any]
     reader: type[GoalReader]
     kinds: list[PointKind] = field(default_factory=list)
-    _number: dict[PointKind, int] = field(default_factory=dict)
+    _number: dict[tuple[int, int, bool], int] = field(default_factory=dict)
+    _alike: dict[TargetSlots, TargetSlots] = field(default_factory=dict)
     _plain: dict[int, PlainMoves] = field(default_factory=dict)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _points: dict[tuple[object, ...], tuple[int, int]] = field(default_factory=dict)
-    _slots: dict[int, tuple[ir.Operand, TargetSlots | None]] = field(
+    _slots: dict[int, tuple[ir.Operand, tuple[int, TargetSlots] | None]] = field(
         default_factory=dict
     )
 
-    def runs_of(self, machine: TaskMachine, context: Context) -> Runs:
+    def runs_of(self, machine: MoveReader, context: Context) -> Runs:
         """Return which moves are read at once in a call, or a round of a loop.
 
         They are found in the statements of a routine once for all calls of it.
@@ -105,11 +126,11 @@ class TaskBlocks:
             self._runs[key] = find_runs(flow.first, flow.joins, plain, own, ends)
         return self._runs[key]
 
-    def _find_plain(self, machine: TaskMachine, file: int) -> PlainMoves:
+    def _find_plain(self, machine: MoveReader, file: int) -> PlainMoves:
         if file not in self._plain:
 
             def read(one: ir.SourceStatement) -> PlainMove | None:
-                end, planner = machine.plain_end(one), machine.planner_of(one)
+                end, planner = self.task.plain_end(one), machine.planner_of(one)
                 return PlainMove.to(end, self.reader.slots_of, planner)
 
             sound, text = self.reader.are_sound, self.texts[file]
@@ -125,7 +146,7 @@ class TaskBlocks:
 
     # What a block stands for.
 
-    def read(self, machine: TaskMachine, at: At, behind: int, here: Any) -> MoveBlock:
+    def read(self, machine: MoveReader, at: At, behind: int, here: Any) -> MoveBlock:
         """Read the moves of a block.
 
         Args:
@@ -150,13 +171,13 @@ class TaskBlocks:
             aux=self._read_aux(targets, examples, group),
         )  # fmt: skip
 
-    def _slots_at(self, targets: Targets, k: int) -> tuple[int, ...]:
+    def _slots_at(self, targets: BlockTargets, k: int) -> tuple[int, ...]:
         """Return the numbers of the job that a target is written in."""
         kind = self.kinds[targets.kind[k]]
         begin = int(targets.origin[k]) + self.task.numbering.first[kind.file]
         return tuple(begin + at if at >= 0 else -1 for at in kind.target.slots)
 
-    def _tell_apart(self, targets: Targets) -> list[Ints]:
+    def _tell_apart(self, targets: BlockTargets) -> list[Ints]:
         """Return what tells moves apart of which one cannot stand for the other."""
         columns = [targets.variant, targets.kind]
         for at in self.reader.told_apart:
@@ -168,7 +189,7 @@ class TaskBlocks:
         return columns
 
     def _read_aux(
-        self, targets: Targets, examples: Sequence[FoundVisit], group: Ints
+        self, targets: BlockTargets, examples: Sequence[FoundVisit], group: Ints
     ) -> Floats | None:
         """Return external axes of moves, None where those of the examples are alike."""
         found, given = None, np.array([one.goal.aux for one in examples])
@@ -189,24 +210,24 @@ class TaskBlocks:
         Args:
             kind: The kind of each move, (k,).
         """
-        for number in np.unique(kind[kind != ALONE]).tolist():
-            own = self.kinds[number]
-            text = self.texts[own.file]
-            yield np.flatnonzero(kind == number), text, own.target
+        for number, mine in split_by(kind):
+            if number != ALONE:
+                own = self.kinds[number]
+                yield mine, self.texts[own.file], own.target
 
     # Where moves go.
 
-    def _find_targets(self, scope: Scope, rows: Ints, points: Points) -> Targets:
+    def _find_targets(self, scope: Scope, rows: Ints, points: Points) -> BlockTargets:
         """Find where moves go, and which of them are read by themselves."""
         text, plain = self.texts[scope.file], self._plain[scope.file]
         variant, kind = plain.variant[rows], np.full(len(rows), ALONE, dtype=np.int64)
-        found = Targets(variant, kind, text.first[rows].astype(np.int64), [])
+        found = BlockTargets(variant, kind, text.first[rows].astype(np.int64), [])
         hidden = {key[0][-1] for key in points.held}.union(scope.parameters)
         hidden |= {*dict(scope.loops)}.union(one[0] for one in scope.given)
-        for number in np.unique(variant).tolist():
-            move, mine = plain.moves[number], np.flatnonzero(variant == number)
+        for number, mine in split_by(variant):
+            move = plain.moves[number]
             if move.target is not None:
-                kind[mine] = self._number_of(PointKind(scope.file, move.target))
+                kind[mine] = self._number_of(scope.file, move.target)
             else:
                 found.names = found.names or [""] * len(rows)
                 self._find_named(scope, rows[mine], mine, move, hidden, found)
@@ -217,7 +238,7 @@ class TaskBlocks:
 
     def _find_named(
         self, scope: Scope, rows: Ints, mine: Ints, move: PlainMove,
-        hidden: Collection[str], found: Targets,
+        hidden: Collection[str], found: BlockTargets,
     ) -> None:  # fmt: skip
         """Find the points that moves of one variant go to.
 
@@ -258,38 +279,45 @@ class TaskBlocks:
         found = task.constant(name, scope, index if apart else ())
         if found is None or reader.read_special(ir.DataObject(name)) is not None:
             return ALONE, 0
-        (file, datum), operand = found, found[1].value
-        for at in () if apart else index:
-            items = operand.items if isinstance(operand, ir.Composite) else ()
-            operand = items[at - 1] if 0 < at <= len(items) else None
-        target = self._slots_of(operand)
-        if target is None or task.files[file].is_system:
+        file, datum = found
+        written = self._slots_of(element_of(datum.value, () if apart else index))
+        if written is None or task.files[file].is_system:
             return ALONE, 0
-        origin = int(task.files[file].text.first[datum.row])
-        slot = task.numbering.first[file] + origin + target.slots[0]
+        origin = int(task.files[file].text.first[datum.row]) + written[0]
+        slot = task.numbering.first[file] + origin + written[1].slots[0]
         marked = name in task.start.taught or bool(task.taught_lines[file])
         marked = marked and task.is_taught(name, file, datum.row)
         if marked or reader.explain_pinned(name, slot):
             return ALONE, 0
-        whole_datum = task.datum(name, scope)
-        shared = whole_datum is not None and whole_datum[1].scope == "global"
-        return self._number_of(PointKind(file, target, shared)), origin
+        of_all = found if not apart else task.datum(name, scope)
+        shared = of_all is not None and of_all[1].scope == "global"
+        return self._number_of(file, written[1], shared), origin
 
-    def _slots_of(self, operand: ir.Operand | None) -> TargetSlots | None:
-        """Read a value once for all statements of a form."""
-        key = id(operand)
-        if operand is not None and key not in self._slots:
-            self._slots[key] = operand, self.reader.slots_of(operand)
-        return None if operand is None else self._slots[key][1]
+    def _slots_of(self, operand: ir.Operand | None) -> tuple[int, TargetSlots] | None:
+        """Return the first number of a written target, and all by their distance to it.
 
-    def _number_of(self, kind: PointKind) -> int:
-        if kind not in self._number:
-            self._number[kind] = len(self.kinds)
-            self.kinds.append(kind)
-        return self._number[kind]
+        The value of all statements of a form is one: it is read once.
+        """
+        if operand is None:
+            return None
+        if id(operand) not in self._slots:
+            target, found = self.reader.slots_of(operand), None
+            if target is not None:
+                alike = target.relative()
+                found = min(target.every), self._alike.setdefault(alike, alike)
+            self._slots[id(operand)] = operand, found
+        return self._slots[id(operand)][1]
+
+    def _number_of(self, file: int, target: TargetSlots, shared: bool = False) -> int:
+        """Return the number of a kind of targets."""
+        key = file, id(target), shared
+        if key not in self._number:
+            self._number[key] = len(self.kinds)
+            self.kinds.append(PointKind(file, target, shared))
+        return self._number[key]
 
 
-def _read_one(machine: TaskMachine, at: At, row: int, here: Any) -> FoundVisit:
+def _read_one(machine: MoveReader, at: At, row: int, here: Any) -> FoundVisit:
     """Read a move of a block by itself."""
     statement, scope = at.place.statement(row), replace(at.place.scope, row=row)
     (found,) = machine.read_visits(statement, scope, here)

@@ -214,13 +214,6 @@ class TaskMachine(Interpreter[Arrived]):
     def is_move(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement moves."""
 
-    @abstractmethod
-    def plain_end(self, one: Any) -> ir.Operand | None:
-        """Return where a move goes that does nothing else, None for all other lines.
-
-        But for data by name, and numbers, nothing stands in it that could differ.
-        """
-
     def planner_of(self, one: Any) -> str:
         """Return what plans a move, where there are several that tell moves apart."""
         return ""
@@ -301,7 +294,10 @@ class TaskMachine(Interpreter[Arrived]):
         return found
 
     def is_beside(self, one: Any) -> bool:
-        """Return True if a statement runs otherwise than it is followed."""
+        """Return True if a statement runs otherwise than it is followed.
+
+        No name with a digit decides that.
+        """
         return False
 
     def list_handlers(self, routine: TaskRoutine) -> Iterable[tuple[int, int, int]]:
@@ -747,7 +743,7 @@ class TaskMachine(Interpreter[Arrived]):
                 if routine.rows.head.kind not in self.procedures:
                     yield file, routine.inside.start, routine.inside.stop
                 yield from self.list_handlers(routine)
-            for row in text.where(self.is_beside):
+            for row in text.of_kind(self.is_beside):
                 yield file, row, row + 1
 
     def goals_of(self, file: int, row: int) -> Iterator[Any]:

@@ -190,8 +190,9 @@ class Collector(ABC):
     def count_axes(self) -> int:
         """Return the last auxiliary axis that targets give a value of."""
         aux = np.array([v.goal.aux for v in self.found], float)
-        used = ~np.isnan(aux).all(axis=0) if len(aux) else []
-        return int(np.flatnonzero(used).max(initial=-1)) + 1
+        several = [aux, *(one.aux for _, _, one in self.blocks if one.aux is not None)]
+        used = [~np.isnan(one).all(axis=0) for one in several if len(one)]
+        return int(np.flatnonzero(np.any(used, axis=0)).max(initial=-1)) + 1
 
     # What follows from that.
 

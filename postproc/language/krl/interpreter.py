@@ -30,7 +30,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoal, plain_end
+from postproc.language.krl.moves import KrlGoal
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -121,10 +121,6 @@ class KrlMachine(TaskMachine):
         """Return True for moves."""
         return isinstance(one, said.KrlMove)
 
-    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
-        """Return where a plain move goes, see `TaskMachine.plain_end`."""
-        return plain_end(one) if isinstance(one, said.KrlMove) else None
-
     def planner_of(self, one: ir.SourceStatement) -> str:
         """Return the planner of a move: they do not blend into each other."""
         spline = isinstance(one, said.KrlMove) and one.word.startswith("s")
@@ -163,7 +159,7 @@ class KrlMachine(TaskMachine):
     def _has_interrupts(self) -> bool:
         """Return True if interrupts or triggers may call routines."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for text in self.texts for one in text.said)
+        said_ones = (one for text in self.texts for one in text.said.said)
         return any(isinstance(one, kinds) for one in said_ones)
 
     # What it does.
@@ -342,7 +338,7 @@ class KrlMachine(TaskMachine):
             if self.task.files[file].is_submit:
                 continue
             here = Scope(file, self.task.files[file].name, "")
-            for row in text.where(lambda one: isinstance(one, kinds)):
+            for row in text.of_kind(lambda one: isinstance(one, kinds)):
                 one, around = text.statement(row), self.task.routine_around(file, row)
                 word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
                 number = self._number_of(here.at(row), one.number)

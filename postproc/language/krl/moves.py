@@ -144,12 +144,6 @@ def motion_of(word: str) -> Motion:
     return Motion.JOINT if stem.startswith("ptp") else Motion.LINEAR
 
 
-def plain_end(move: said.KrlMove) -> ir.Operand | None:
-    """Return where a move goes that does nothing else, None for all others."""
-    plain = move.word in ("ptp", "lin", "sptp", "slin") and not move.settings
-    return move.to if plain and move.via is None and move.angle is None else None
-
-
 @dataclass(frozen=True)
 class KrlGoal(goals.GoalReader):
     """Reads where moves lead."""

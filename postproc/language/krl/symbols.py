@@ -205,7 +205,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             found[table].add(ANY)
         for number, file in enumerate(self.files):
             there = Scope(number, file.name, "")
-            for row in file.text.where(lambda one: bool(self.list_changes(one))):
+            for row in file.text.of_kind(lambda one: bool(self.list_changes(one))):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in found and not given:
@@ -292,6 +292,13 @@ class KrlTask(TaskSymbols[KrlFile]):
                 own = (x for x in one.children() if isinstance(x, ir.Operand))
                 return ir.walk(*own, *(setting.value for setting in settings))
         return ir.walk(one)
+
+    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
+        """Return where a plain move goes, see `TaskSymbols.plain_end`."""
+        if not isinstance(one, said.KrlMove) or one.settings:
+            return None
+        plain = one.word in ("ptp", "lin", "sptp", "slin") and one.via is None
+        return one.to if plain and one.angle is None else None
 
     def note_in(self, uses: NamesUsed, file: KrlFile, one: ir.SourceStatement) -> None:
         """Note a statement; what a data list assigns is the first value of data."""

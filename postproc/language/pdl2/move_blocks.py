@@ -21,6 +21,7 @@ from postproc.language.analysis.move_blocks import (
     find_plain,
     find_runs,
     number_rows,
+    split_by,
 )
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
@@ -351,9 +352,9 @@ def _block(
     if (points >= 0).any():
         at = np.maximum(points, 0)
         names, values = entries.name.take(at), entries.numbers[at]
-        for number in np.unique(entries.layout[points[points >= 0]]).tolist():
-            mine = (points >= 0) & (entries.layout[at] == number)
-            for column, axis in enumerate(entries.layouts[number].axes):
+        for number, mine in split_by(np.where(points >= 0, entries.layout[at], -1)):
+            axes = entries.layouts[number].axes if number >= 0 else ()
+            for column, axis in enumerate(axes):
                 if 1 <= axis <= MOST_AXES:
                     aux = np.full((len(at), MOST_AXES), np.nan) if aux is None else aux
                     aux[mine, axis - 1] = entries.aux[at[mine], column]

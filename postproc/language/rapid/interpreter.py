@@ -39,7 +39,6 @@ from postproc.language.rapid.modal_state import (
 )
 from postproc.language.rapid.moves import (
     RapidGoal,
-    plain_end,
     pose_of,
 )
 from postproc.language.rapid.program import is_move
@@ -116,7 +115,7 @@ class RapidMachine(TaskMachine):
             text = self.texts[routine.file]
             for row in text.where(
                 lambda one: getattr(ir.inside(one), "name", "") in modal,
-                rows.start, rows.stop,
+                rows.start, rows.stop, by_name=True,
             ):  # fmt: skip
                 one = ir.inside(text.statement(row))
                 if isinstance(one, ir.Instruction):
@@ -127,12 +126,6 @@ class RapidMachine(TaskMachine):
     def _of_kind(self, kind: str) -> list[TaskRoutine]:
         """Return all routines of a kind."""
         return [one for one in self.task.every_routine if one.rows.head.kind == kind]
-
-    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
-        """Return where a plain move goes, see `TaskMachine.plain_end`."""
-        if not isinstance(one, ir.Instruction) or one.name in self.task.routines:
-            return None
-        return plain_end(one)
 
     is_move = staticmethod(is_move)
 

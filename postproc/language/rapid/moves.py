@@ -425,23 +425,6 @@ def _is_unit(q: Sequence[float]) -> bool:
     return sum(c * c for c in q) > SHORTEST**2
 
 
-def plain_end(one: ir.Instruction) -> ir.Operand | None:
-    """Return where a move goes that does nothing else, None for all other lines."""
-    signature = MOTIONS.get(one.name)
-    if signature is None or signature.via >= 0 or not signature.reaches:
-        return None
-    to, _ = signature.operands(one.arguments)
-    others = (a.value for a in one.arguments if a.value is not to)
-    simple = (
-        value is None
-        or isinstance(value, ir.Num)
-        or (isinstance(value, ir.DataObject) and not value.steps)
-        for value in others
-    )
-    passed_on = any(argument.passed_on for argument in one.arguments)
-    return to if all(simple) and not passed_on else None
-
-
 _COUNTS: tuple[tuple[int, ...], ...] = (
     (3, 4, 4, 6),
     (6, 6),

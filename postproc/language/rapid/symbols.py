@@ -123,6 +123,24 @@ class RapidTask(TaskSymbols[RapidFile]):
             and not self.is_used_beside(name, here)
         )
 
+    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
+        """Return where a plain move goes, see `TaskSymbols.plain_end`."""
+        if not isinstance(one, ir.Instruction) or one.name in self.routines:
+            return None
+        signature = MOTIONS.get(one.name)
+        if signature is None or signature.via >= 0 or not signature.reaches:
+            return None
+        to, _ = signature.operands(one.arguments)
+        others = (a.value for a in one.arguments if a.value is not to)
+        simple = (
+            value is None
+            or isinstance(value, ir.Num)
+            or (isinstance(value, ir.DataObject) and not value.steps)
+            for value in others
+        )
+        passed_on = any(argument.passed_on for argument in one.arguments)
+        return to if all(simple) and not passed_on else None
+
     def note_odd(self, uses: NamesUsed) -> None:
         """Note words of what is not understood; but a move sets nothing."""
         uses.changed |= self.words_of_odd(_READING_MOVES)
