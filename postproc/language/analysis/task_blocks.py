@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from postproc.language.analysis.assigned_points import Points, Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.found_goals import FoundVisit
 from postproc.language.analysis.goals import GoalReader
+from postproc.language.analysis.interpreter import Interpreter, S
 from postproc.language.analysis.move_blocks import (
     MoveBlock,
     PlainMove,
@@ -32,28 +34,6 @@ from postproc.language.analysis.symbols import TaskSymbols, element_of, whole
 from postproc.language.text.symbol_column import NameColumn
 
 ALONE = -1  # kind of a target that is read by itself
-
-
-class MoveReader(Protocol):
-    """What a machine knows of the moves that it follows."""
-
-    @property
-    def ends_apart(self) -> bool:
-        """Whether the first and the last of a block are read by themselves."""
-
-    def reads_at_once(self, context: Context) -> bool:
-        """Return True if moves in a call, or a round of a loop, are read at once."""
-
-    def list_apart(self, file: int) -> set[int]:
-        """Return the rows of moves that are read by themselves."""
-
-    def planner_of(self, one: Any) -> str:
-        """Return what plans a move, where there are several that tell moves apart."""
-
-    def read_visits(
-        self, one: ir.SourceStatement, scope: Scope, here: Any
-    ) -> Iterable[Any]:
-        """Read the visits of a move, nothing for all else."""
 
 
 @dataclass(frozen=True)
@@ -88,19 +68,23 @@ class BlockTargets:
     names: list[str]
 
 
-@dataclass
-class TaskBlocks:
-    """The blocks of moves of a task, found when they are first come to.
+@dataclass(kw_only=True)
+class BlockMachine(Interpreter[S]):
+    """The ways through a task, whose plain moves are read at once.
 
     Attributes:
+        reader: Reads where moves lead.
+        ends_apart: The first and the last of a block are read by themselves: what comes
+            before or behind tells of these.
         task: What its names mean.
-        reader: Reads where its moves lead.
-        kinds: Kinds of targets, by number.
+        at_once: Moves that differ only in where they go are read at once.
     """
 
+    reader: ClassVar[type[GoalReader]]
+    ends_apart: ClassVar[bool] = False
     task: TaskSymbols[Any]
-    reader: type[GoalReader]
-    kinds: list[PointKind] = field(default_factory=list)
+    at_once: bool = True
+    _kinds: list[PointKind] = field(default_factory=list)
     _number: dict[tuple[int, int, bool], int] = field(default_factory=dict)
     _alike: dict[TargetSlots, TargetSlots] = field(default_factory=dict)
     _plain: dict[int, PlainMoves] = field(default_factory=dict)
@@ -110,47 +94,74 @@ class TaskBlocks:
         default_factory=dict
     )
 
-    def runs_of(self, machine: MoveReader, context: Context) -> Runs:
+    # What a language says.
+
+    def reads_at_once(self, context: Context) -> bool:
+        """Return True if moves in a call, or a round of a loop, are read at once."""
+        return self.at_once
+
+    def list_apart(self, file: int) -> set[int]:
+        """Return the rows of moves that are read by themselves."""
+        return set()
+
+    def planner_of(self, one: Any) -> str:
+        """Return what plans a move, where there are several that tell moves apart."""
+        return ""
+
+    @abstractmethod
+    def read_visits(
+        self, one: ir.SourceStatement, scope: Scope, here: Any
+    ) -> Iterable[Any]:
+        """Read the visits of a move, nothing for all else.
+
+        Args:
+            one: The statement.
+            scope: Where it stands.
+            here: How the arm comes to it, None where that does not count.
+        """
+
+    # Which moves are read at once.
+
+    @property
+    def texts(self) -> Sequence[Any]:
+        """The statements of all files, the main one first."""
+        return self.task.numbering.texts
+
+    def runs_of(self, context: Context) -> Runs:
         """Return which moves are read at once in a call, or a round of a loop.
 
         They are found in the statements of a routine once for all calls of it.
         """
         place = context.place
         key = place.scope.file, place.flow.first
-        if not machine.reads_at_once(context):
+        if not self.reads_at_once(context):
             return {}
         if key not in self._runs:
-            plain = self._find_plain(machine, place.scope.file)
-            flow, ends = place.flow, machine.ends_apart
+            plain = self._find_plain(place.scope.file)
+            flow, ends = place.flow, self.ends_apart
             own = plain.variant[flow.first : flow.last]
             self._runs[key] = find_runs(flow.first, flow.joins, plain, own, ends)
         return self._runs[key]
 
-    def _find_plain(self, machine: MoveReader, file: int) -> PlainMoves:
+    def _find_plain(self, file: int) -> PlainMoves:
         if file not in self._plain:
 
             def read(one: ir.SourceStatement) -> PlainMove | None:
-                end, planner = self.task.plain_end(one), machine.planner_of(one)
+                end, planner = self.task.plain_end(one), self.planner_of(one)
                 return PlainMove.to(end, self.reader.slots_of, planner)
 
             sound, text = self.reader.are_sound, self.texts[file]
             apart = rows_of_lines(text, self.task.taught_lines[file])
-            apart |= machine.list_apart(file)
+            apart |= self.list_apart(file)
             self._plain[file] = find_plain(text, read, sound, apart)
         return self._plain[file]
 
-    @property
-    def texts(self) -> Sequence[Any]:
-        """The statements of all files."""
-        return self.task.numbering.texts
-
     # What a block stands for.
 
-    def read(self, machine: MoveReader, at: At, behind: int, here: Any) -> MoveBlock:
+    def read_block(self, at: At, behind: int, here: Any) -> MoveBlock:
         """Read the moves of a block.
 
         Args:
-            machine: It follows the task.
             at: The first of them.
             behind: The row behind the last.
             here: How the arm comes to it.
@@ -159,7 +170,7 @@ class TaskBlocks:
         targets = self._find_targets(at.place.scope, rows, here.points)
         examples, group, first = choose_examples(
             self._tell_apart(targets), targets.kind == ALONE,
-            lambda k: _read_one(machine, at, int(rows[k]), here),
+            lambda k: self._read_one(at, int(rows[k]), here),
             lambda k: self._slots_at(targets, k),
         )  # fmt: skip
         origin, some = targets.origin, any(targets.names)
@@ -171,9 +182,16 @@ class TaskBlocks:
             aux=self._read_aux(targets, examples, group),
         )  # fmt: skip
 
+    def _read_one(self, at: At, row: int, here: Any) -> FoundVisit:
+        """Read a move of a block by itself."""
+        statement, scope = at.place.statement(row), replace(at.place.scope, row=row)
+        (found,) = self.read_visits(statement, scope, here)
+        one: FoundVisit = found
+        return one
+
     def _slots_at(self, targets: BlockTargets, k: int) -> tuple[int, ...]:
         """Return the numbers of the job that a target is written in."""
-        kind = self.kinds[targets.kind[k]]
+        kind = self._kinds[targets.kind[k]]
         begin = int(targets.origin[k]) + self.task.numbering.first[kind.file]
         return tuple(begin + at if at >= 0 else -1 for at in kind.target.slots)
 
@@ -212,7 +230,7 @@ class TaskBlocks:
         """
         for number, mine in split_by(kind):
             if number != ALONE:
-                own = self.kinds[number]
+                own = self._kinds[number]
                 yield mine, self.texts[own.file], own.target
 
     # Where moves go.
@@ -227,7 +245,7 @@ class TaskBlocks:
         for number, mine in split_by(variant):
             move = plain.moves[number]
             if move.target is not None:
-                kind[mine] = self._number_of(scope.file, move.target)
+                kind[mine] = self._kind_of(scope.file, move.target)
             else:
                 found.names = found.names or [""] * len(rows)
                 self._find_named(scope, rows[mine], mine, move, hidden, found)
@@ -291,7 +309,7 @@ class TaskBlocks:
             return ALONE, 0
         of_all = found if not apart else task.datum(name, scope)
         shared = of_all is not None and of_all[1].scope == "global"
-        return self._number_of(file, written[1], shared), origin
+        return self._kind_of(file, written[1], shared), origin
 
     def _slots_of(self, operand: ir.Operand | None) -> tuple[int, TargetSlots] | None:
         """Return the first number of a written target, and all by their distance to it.
@@ -308,18 +326,10 @@ class TaskBlocks:
             self._slots[id(operand)] = operand, found
         return self._slots[id(operand)][1]
 
-    def _number_of(self, file: int, target: TargetSlots, shared: bool = False) -> int:
+    def _kind_of(self, file: int, target: TargetSlots, shared: bool = False) -> int:
         """Return the number of a kind of targets."""
         key = file, id(target), shared
         if key not in self._number:
-            self._number[key] = len(self.kinds)
-            self.kinds.append(PointKind(file, target, shared))
+            self._number[key] = len(self._kinds)
+            self._kinds.append(PointKind(file, target, shared))
         return self._number[key]
-
-
-def _read_one(machine: MoveReader, at: At, row: int, here: Any) -> FoundVisit:
-    """Read a move of a block by itself."""
-    statement, scope = at.place.statement(row), replace(at.place.scope, row=row)
-    (found,) = machine.read_visits(statement, scope, here)
-    one: FoundVisit = found
-    return one

@@ -16,10 +16,8 @@ from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.analysis.declarations import TaskRoutine
-from postproc.language.analysis.goals import GoalReader
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
-    Interpreter,
     calls_around,
 )
 from postproc.language.analysis.origins import (
@@ -30,7 +28,7 @@ from postproc.language.analysis.origins import (
     join_origins,
 )
 from postproc.language.analysis.symbols import TaskSymbols
-from postproc.language.analysis.task_blocks import TaskBlocks
+from postproc.language.analysis.task_blocks import BlockMachine
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
@@ -135,7 +133,7 @@ M = TypeVar("M", bound="TaskMachine")
 
 
 @dataclass
-class TaskMachine(Interpreter[Arrived]):
+class TaskMachine(BlockMachine[Arrived]):
     """The ways through a task.
 
     Attributes:
@@ -144,28 +142,17 @@ class TaskMachine(Interpreter[Arrived]):
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
         still: Names of what is known not to move, nor to change how moves are made.
-        reader: Reads where moves lead.
-        task: What its names mean.
         diagnostics: What else was found.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
-        at_once: Moves that differ only in where they go are read at once.
-        ends_apart: .. but for the first and the last of them: what comes before or
-            behind tells of these.
-        blocks: The moves that are.
     """
 
     procedures: ClassVar[Collection[str]]
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     still: ClassVar[Collection[str]]
-    reader: ClassVar[type[GoalReader]]
-    ends_apart: ClassVar[bool] = False
-    task: TaskSymbols[Any] = field(kw_only=True)
     diagnostics: set[Diagnostic] = field(default_factory=set)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
-    at_once: bool = True
-    blocks: TaskBlocks = field(init=False)
     _numbers: dict[At, list[int]] = field(default_factory=dict)
     _read: dict[tuple[int, int], tuple[Effects, list[TaskRoutine]]] = field(
         default_factory=dict
@@ -179,12 +166,7 @@ class TaskMachine(Interpreter[Arrived]):
 
     def __post_init__(self) -> None:
         """Let assignments read where moves to points lead."""
-        self.task.reader, self.blocks = self.reader, TaskBlocks(self.task, self.reader)
-
-    @property
-    def texts(self) -> Sequence[Any]:
-        """The statements of all files, the main one first."""
-        return self.task.numbering.texts
+        self.task.reader = self.reader
 
     # What a language says.
 
@@ -217,14 +199,6 @@ class TaskMachine(Interpreter[Arrived]):
     def planner_of(self, one: Any) -> str:
         """Return what plans a move, where there are several that tell moves apart."""
         return ""
-
-    def reads_at_once(self, context: Context) -> bool:
-        """Return True if moves in a call, or a round of a loop, are read at once."""
-        return self.at_once
-
-    def list_apart(self, file: int) -> set[int]:
-        """Return the rows of moves that are read by themselves."""
-        return set()
 
     def is_asked(self, part: ir.Node) -> bool:
         """Return True if it counts that a statement asks for something as it runs."""
@@ -352,14 +326,14 @@ class TaskMachine(Interpreter[Arrived]):
 
     def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived | None] | None:
         """Run moves that follow each other; the visit of the first stands for all."""
-        behind = self.blocks.runs_of(self, at.context).get(at.row)
+        behind = self.runs_of(at.context).get(at.row)
         if behind is None:
             return None
         known = self._numbers.get(at)
         if known is None:
             known = self._numbers[at] = [len(self.visits)]
             self.keys.append((at.context, at.job_row, 0))
-            self.visits.append(self.blocks.read(self, at, behind, state))
+            self.visits.append(self.read_block(at, behind, state))
         else:
             self._read_block_again(at, behind, state, known[0])
         after = self._come_from(known, at, state)
@@ -372,7 +346,7 @@ class TaskMachine(Interpreter[Arrived]):
         old = self.visits[number]
         modes = old.modes.join(here.modes)
         if (modes, here.points) != (old.modes, old.points):
-            new = self.blocks.read(self, at, behind, here.with_modes(modes))
+            new = self.read_block(at, behind, here.with_modes(modes))
             new.origins, new.left = old.origins, old.left
             self.visits[number] = new
 

@@ -24,7 +24,6 @@ from postproc.language.pdl2.moves import is_listed
 from postproc.language.pdl2.pose_encoding import COMMENTS, PDL2_DIALECT
 
 _IN_PART = "a target is computed from a part of it"
-_UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read")
 _RECURSIVE = Reason(
     Code.RECURSION, "it stands in a routine that calls itself, which is not followed"
 )
