@@ -106,10 +106,20 @@ class GoalReader(ABC):
             slot: Its first number, -1 where none is written.
         """
 
-    @staticmethod
     @abstractmethod
-    def slots_of(operand: ir.Operand | None) -> TargetSlots | None:
-        """Return the numbers of a written target, None for all other operands."""
+    def goal_of(
+        self,
+        target: TargetSlots,
+        numbers: Sequence[float | None],
+        outside: Sequence[float | None],
+    ) -> FoundGoal:
+        """Return where numbers lead, without where they stand.
+
+        Args:
+            target: Which of them are written.
+            numbers: Of the target, w, None for what is not written.
+            outside: Of external axes, likewise.
+        """
 
     @staticmethod
     @abstractmethod
@@ -193,6 +203,36 @@ class GoalReader(ABC):
 
     def read_point(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a point that is written or named."""
+        return self._read_written(operand) or self._read_any(operand)
+
+    def _read_written(self, operand: ir.Operand | None) -> FoundGoal | None:
+        """Read a point all of whose numbers stand in one statement, None for others."""
+        file, row, written, name = self.here.file, self.here.row, operand, ""
+        if isinstance(operand, ir.DataObject) and not operand.steps:
+            found = self.task.constant(operand.name, self.here)
+            if found is None:
+                return None
+            file, row, written = found[0], found[1].row, found[1].value
+            name = operand.name
+        target = self.task.slots_of(written)
+        if target is None:
+            return None
+        text, begin = self.task.files[file].text, self.task.numbering.first[file]
+        first = int(text.first[row])
+        numbers, outside = (
+            [float(text.value[first + at]) if at >= 0 else None for at in some]
+            for some in (target.slots, target.aux)
+        )
+        if not all(x is None or math.isfinite(x) for x in (*numbers, *outside)):
+            return None
+        goal = self.goal_of(target, numbers, outside)
+        begin += first
+        slots = tuple([begin + at if at >= 0 else -1 for at in target.slots])
+        goal = replace(goal, slots=slots, follows=(-1,) * len(slots))
+        return self.name_goal(goal, name) if name else goal
+
+    def _read_any(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a point that is computed, or a part of other data."""
         name = operand.name if isinstance(operand, ir.DataObject) else ""
         goal = self.read_value(self.task.value(operand, self.here))
         if goal is None:

@@ -28,19 +28,25 @@ class TargetSlots:
     Attributes:
         slots: Those of the target, w as of all targets, -1 for what is not written.
         aux: Those of external axes, likewise.
+        joints: It is joint angles.
     """
 
     slots: tuple[int, ...]
     aux: tuple[int, ...] = ()
+    joints: bool = False
 
     def relative(self) -> TargetSlots:
         """Return them by their distance to the first of all."""
-        first = min(self.every)
         slots, aux = (
-            tuple([at - first if at >= 0 else -1 for at in some])
+            tuple([at - self.begin if at >= 0 else -1 for at in some])
             for some in (self.slots, self.aux)
         )
-        return TargetSlots(slots, aux)
+        return TargetSlots(slots, aux, self.joints)
+
+    @cached_property
+    def begin(self) -> int:
+        """The first of all."""
+        return min(self.every)
 
     @property
     def every(self) -> frozenset[int]:
@@ -118,8 +124,18 @@ class PlainMoves:
 
     @cached_property
     def going(self) -> Bools:
-        """Which variants move."""
-        return np.array([one.moves for one in self.moves], dtype=bool)
+        """Which variants move, then False for all other statements."""
+        return np.array([*(one.moves for one in self.moves), False], dtype=bool)
+
+    @cached_property
+    def named(self) -> Bools:
+        """Which move to data by name, likewise."""
+        return np.array([*(bool(one.name) for one in self.moves), False], dtype=bool)
+
+    @cached_property
+    def indexed(self) -> Bools:
+        """Which move to an element, likewise."""
+        return np.array([*(bool(one.index) for one in self.moves), False], dtype=bool)
 
     @cached_property
     def planner(self) -> Ints:
@@ -249,7 +265,7 @@ def find_runs(
     loud = np.flatnonzero(variant < 0)
     cuts = [row - first for row in joins if 0 <= row - first < n]
     cuts += (np.flatnonzero(np.diff(planner)) + 1).tolist()
-    going = np.flatnonzero((variant >= 0) & np.append(plain.going, False)[variant])
+    going = np.flatnonzero(plain.going[variant])
     begin = np.union1d(np.append(loud + 1, 0), cuts).astype(np.int64)
     end = np.append(begin[1:], n)
     at = np.searchsorted(going, begin)
@@ -266,6 +282,10 @@ def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
 
 
 # What comes out: arrivals that stand for many.
+
+
+Chosen = tuple[Sequence[FoundVisit], Ints, Ints]
+"""Arrivals, the one that stands for each move of k, and the move of each."""
 
 
 @dataclass
@@ -290,6 +310,23 @@ class MoveBlock(FoundVisit):
     names: NameColumn | None = field(kw_only=True, default=None)
     aux: Floats | None = field(kw_only=True, default=None)
     values: Floats | None = field(kw_only=True, default=None)
+
+    @classmethod
+    def of(cls, chosen: Chosen, rows: Ints, origin: Ints, **more: Any) -> Self:
+        """Put a block together.
+
+        Args:
+            chosen: As `choose_examples` returns it.
+            rows: Its moves, (k,).
+            origin: First number of the statement that says where each goes, (k,).
+            more: What else is said of it.
+        """
+        (one, *_), group, first = chosen
+        return cls(
+            one.scope, one.motion, False, one.goal, count=len(rows), at_once=rows,
+            examples=chosen[0], group=group, offset=origin - origin[first][group],
+            **more,
+        )  # fmt: skip
 
     @property
     def rows(self) -> Ints:
@@ -321,7 +358,7 @@ def choose_examples(
     alone: Bools,
     read: Callable[[int], FoundVisit],
     slots_of: Callable[[int], Sequence[int]],
-) -> tuple[list[FoundVisit], Ints, Ints]:
+) -> Chosen:
     """Find arrivals of which each stands for all that are alike, and read them.
 
     Args:

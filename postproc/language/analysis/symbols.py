@@ -24,6 +24,7 @@ from postproc.language.analysis.assigned_points import (
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
     ALIKE,
@@ -91,6 +92,9 @@ class TaskSymbols(ABC, Generic[F]):
     )
     _doubled: set[Place] = field(default_factory=set, init=False)
     _names: dict[int, tuple[ir.Operand, frozenset[str]]] = field(
+        default_factory=dict, init=False
+    )
+    _written: dict[int, tuple[ir.Operand, TargetSlots | None]] = field(
         default_factory=dict, init=False
     )
     _changes: dict[int, tuple[ir.SourceStatement, Sequence[ir.DataObject]]] = field(
@@ -202,6 +206,18 @@ class TaskSymbols(ABC, Generic[F]):
         But for data by name, and numbers, nothing stands in it that could differ.
         """
         return None
+
+    @abstractmethod
+    def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
+        """Return the numbers of a written target, None for all other operands."""
+
+    def slots_of(self, operand: ir.Operand | None) -> TargetSlots | None:
+        """Read a value once for all statements of a form, see `read_slots`."""
+        if operand is None:
+            return None
+        if id(operand) not in self._written:
+            self._written[id(operand)] = operand, self.read_slots(operand)
+        return self._written[id(operand)][1]
 
     def note_in(self, uses: NamesUsed, file: F, one: ir.SourceStatement) -> None:
         """Note what a statement of a file changes and takes."""

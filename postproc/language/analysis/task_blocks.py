@@ -90,9 +90,7 @@ class BlockMachine(Interpreter[S]):
     _plain: dict[int, PlainMoves] = field(default_factory=dict)
     _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
     _points: dict[tuple[object, ...], tuple[int, int]] = field(default_factory=dict)
-    _slots: dict[int, tuple[ir.Operand, tuple[int, TargetSlots] | None]] = field(
-        default_factory=dict
-    )
+    _near: dict[int, TargetSlots] = field(default_factory=dict)
 
     # What a language says.
 
@@ -148,7 +146,7 @@ class BlockMachine(Interpreter[S]):
 
             def read(one: ir.SourceStatement) -> PlainMove | None:
                 end, planner = self.task.plain_end(one), self.planner_of(one)
-                return PlainMove.to(end, self.reader.slots_of, planner)
+                return PlainMove.to(end, self.task.slots_of, planner)
 
             sound, text = self.reader.are_sound, self.texts[file]
             apart = rows_of_lines(text, self.task.taught_lines[file])
@@ -168,18 +166,15 @@ class BlockMachine(Interpreter[S]):
         """
         rows = np.arange(at.row, behind)
         targets = self._find_targets(at.place.scope, rows, here.points)
-        examples, group, first = choose_examples(
+        chosen = choose_examples(
             self._tell_apart(targets), targets.kind == ALONE,
             lambda k: self._read_one(at, int(rows[k]), here),
             lambda k: self._slots_at(targets, k),
         )  # fmt: skip
-        origin, some = targets.origin, any(targets.names)
-        return MoveBlock(
-            examples[0].scope, examples[0].motion, False, examples[0].goal, here.modes,
-            count=len(rows), points=here.points, at_once=rows, examples=examples,
-            group=group, offset=origin - origin[first][group],
-            names=NameColumn(targets.names) if some else None,
-            aux=self._read_aux(targets, examples, group),
+        names = NameColumn(targets.names) if any(targets.names) else None
+        return MoveBlock.of(
+            chosen, rows, targets.origin, modes=here.modes, points=here.points,
+            names=names, aux=self._read_aux(targets, *chosen[:2]),
         )  # fmt: skip
 
     def _read_one(self, at: At, row: int, here: Any) -> FoundVisit:
@@ -298,33 +293,22 @@ class BlockMachine(Interpreter[S]):
         if found is None or reader.read_special(ir.DataObject(name)) is not None:
             return ALONE, 0
         file, datum = found
-        written = self._slots_of(element_of(datum.value, () if apart else index))
-        if written is None or task.files[file].is_system:
+        target = task.slots_of(element_of(datum.value, () if apart else index))
+        if target is None or task.files[file].is_system:
             return ALONE, 0
-        origin = int(task.files[file].text.first[datum.row]) + written[0]
-        slot = task.numbering.first[file] + origin + written[1].slots[0]
+        first = int(task.files[file].text.first[datum.row])
+        slot = task.numbering.first[file] + first + target.slots[0]
         marked = name in task.start.taught or bool(task.taught_lines[file])
         marked = marked and task.is_taught(name, file, datum.row)
         if marked or reader.explain_pinned(name, slot):
             return ALONE, 0
         of_all = found if not apart else task.datum(name, scope)
         shared = of_all is not None and of_all[1].scope == "global"
-        return self._kind_of(file, written[1], shared), origin
-
-    def _slots_of(self, operand: ir.Operand | None) -> tuple[int, TargetSlots] | None:
-        """Return the first number of a written target, and all by their distance to it.
-
-        The value of all statements of a form is one: it is read once.
-        """
-        if operand is None:
-            return None
-        if id(operand) not in self._slots:
-            target, found = self.reader.slots_of(operand), None
-            if target is not None:
-                alike = target.relative()
-                found = min(target.every), self._alike.setdefault(alike, alike)
-            self._slots[id(operand)] = operand, found
-        return self._slots[id(operand)][1]
+        if id(target) not in self._near:
+            alike = target.relative()
+            self._near[id(target)] = self._alike.setdefault(alike, alike)
+        near = self._near[id(target)]
+        return self._kind_of(file, near, shared), first + target.begin
 
     def _kind_of(self, file: int, target: TargetSlots, shared: bool = False) -> int:
         """Return the number of a kind of targets."""

@@ -225,19 +225,20 @@ class KrlGoal(goals.GoalReader):
 
     # Points.
 
-    @staticmethod
-    def slots_of(operand: ir.Operand | None) -> TargetSlots | None:
-        """Return the numbers of a written target, see `GoalReader.slots_of`."""
-        fields = operand.fields if isinstance(operand, said.KrlAggregate) else ()
-        slots = {f.name: f.value.slot for f in fields if isinstance(f.value, ir.Num)}
-        outside = tuple(slots.get(name, -1) for name in symbols.OUTSIDE)
-        for names, needed in ((pose_encoding.COMPONENTS, PLACE), (symbols.AXES,) * 2):
-            own = slots.keys() <= {*names, *symbols.OUTSIDE}
-            if own and slots.keys() >= {*needed} and len(slots) == len(fields):
-                found = [slots.get(name, -1) for name in names]
-                found += [-1] * (pose_encoding.WIDTH - len(found))
-                return TargetSlots(tuple(found), outside)
-        return None
+    def goal_of(
+        self,
+        target: TargetSlots,
+        numbers: Sequence[float | None],
+        outside: Sequence[float | None],
+    ) -> FoundGoal:
+        """Return where numbers lead, see `GoalReader.goal_of`."""
+        place = [math.nan if x is None else x for x in numbers[:6]]
+        aux = self._count_outside([math.nan if x is None else x for x in outside])
+        if target.joints:
+            return FoundGoal(Meaning.JOINTS, (*place, 0.0, 0.0), aux=aux)
+        s, t = (pose_encoding.NOT_WRITTEN if x is None else x for x in numbers[6:])
+        why = self._status(s, t)
+        return FoundGoal(Meaning.POSE, (*place, s, t), aux=aux, why=why)
 
     @staticmethod
     def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
@@ -352,8 +353,11 @@ class KrlGoal(goals.GoalReader):
         return ACCURATE if s > 0 and int(s) & pose_encoding.MEASURED else NO_REASON
 
     def _outside(self, found: KnownRecord) -> tuple[float, ...]:
-        """Return the external axes that count: declared by the cell, or not 0."""
-        values = [found.number(name) for name in symbols.OUTSIDE]
+        """Return the external axes that count, see `_count_outside`."""
+        return self._count_outside([found.number(name) for name in symbols.OUTSIDE])
+
+    def _count_outside(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Return external axes: those that the cell declares, or that are not 0."""
         return tuple(
             value if value != 0.0 or axis in self.task.start.aux else math.nan
             for axis, value in enumerate(values, start=1)

@@ -15,6 +15,7 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.declarations import Datum
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
@@ -299,6 +300,19 @@ class KrlTask(TaskSymbols[KrlFile]):
             return None
         plain = one.word in ("ptp", "lin", "sptp", "slin") and one.via is None
         return one.to if plain and one.angle is None else None
+
+    def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
+        """Return the numbers of an aggregate, see `TaskSymbols.read_slots`."""
+        fields = operand.fields if isinstance(operand, said.KrlAggregate) else ()
+        slots = {f.name: f.value.slot for f in fields if isinstance(f.value, ir.Num)}
+        outside = tuple(slots.get(name, -1) for name in OUTSIDE)
+        for names, needed in ((COMPONENTS, COMPONENTS[:6]), (AXES, AXES)):
+            own = slots.keys() <= {*names, *OUTSIDE}
+            if own and slots.keys() >= {*needed} and len(slots) == len(fields):
+                found = [slots.get(name, -1) for name in names]
+                found += [-1] * (len(COMPONENTS) - len(found))
+                return TargetSlots(tuple(found), outside, joints=names is AXES)
+        return None
 
     def note_in(self, uses: NamesUsed, file: KrlFile, one: ir.SourceStatement) -> None:
         """Note a statement; what a data list assigns is the first value of data."""

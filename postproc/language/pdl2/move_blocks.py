@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from postproc.language.analysis.move_blocks import (
 )
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
+from postproc.language.pdl2.entries import Entries
 from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.external_routines import stays_still
 from postproc.language.pdl2.job import Place, World
@@ -145,13 +147,13 @@ class BodyLines:
     def _find_names(self, plain: PlainMoves, variant: Ints) -> None:
         """Find the variables that lines go to; leave those to anything but a point."""
         shapes = self._place.program.lines.shapes
-        named = [bool(one.name) for one in plain.moves]
-        at = np.flatnonzero((variant >= 0) & np.array([*named, False])[variant])
+        at = np.flatnonzero(plain.named[variant])
         open_name = plain.name[self.first + at].astype(np.int64)
-        array = np.array([bool(one.index) for one in plain.moves], dtype=bool)
         # A name of its own, or the one that all of its variant go to.
         code = np.where(open_name >= 0, open_name, -1 - variant[at])
-        used, which = np.unique(2 * code + array[variant[at]], return_inverse=True)
+        used, which = np.unique(
+            2 * code + plain.indexed[variant[at]], return_inverse=True
+        )
         code, array = used // 2, (used % 2).astype(bool)
         literal = [plain.moves[-1 - k].name for k in code[code < 0].tolist()]
         self.names = NameColumn(literal)
@@ -302,9 +304,12 @@ class MoveBlocks:
                 return tuple((base + entries.slots[points[k]]).tolist())
             return tuple(place.first + int(origin[k]) + slot for slot in target.slots)
 
-        found = choose_examples(columns, points == _ALONE, read, slots_at)
-        here.row = begin
-        return _block(here, rows, points, origin, *found)
+        chosen = choose_examples(columns, points == _ALONE, read, slots_at)
+        here.row, more = begin, dict[str, Any]()
+        if named.any():
+            more["names"], more["values"] = entries.name.take(at), entries.numbers[at]
+            more["aux"] = _read_aux(entries, points)
+        return MoveBlock.of(chosen, rows, origin, modes=here.store.settings, **more)
 
     def _run_one_of_each(
         self, here: Execution, lines: BodyLines, rows: Ints, variant: Ints
@@ -332,37 +337,18 @@ class MoveBlocks:
         return self._kinds
 
 
-def _block(
-    here: Execution, rows: Ints, points: Ints, origin: Ints,
-    examples: Sequence[FoundVisit], group: Ints, first: Ints,
-) -> MoveBlock:  # fmt: skip
-    """Put a block together.
-
-    Args:
-        here: Where it begins.
-        rows: Its moves, (k,).
-        points: Rows of the variable file that they go to, (k,), negative for none.
-        origin: First number of where each target is written, (k,).
-        examples: See `choose_examples`.
-        group: See there.
-        first: See there.
-    """
-    entries, names = here.world.initial.entries, None
-    aux = values = None
-    if (points >= 0).any():
-        at = np.maximum(points, 0)
-        names, values = entries.name.take(at), entries.numbers[at]
-        for number, mine in split_by(np.where(points >= 0, entries.layout[at], -1)):
-            axes = entries.layouts[number].axes if number >= 0 else ()
-            for column, axis in enumerate(axes):
-                if 1 <= axis <= MOST_AXES:
-                    aux = np.full((len(at), MOST_AXES), np.nan) if aux is None else aux
-                    aux[mine, axis - 1] = entries.aux[at[mine], column]
-    return MoveBlock(
-        here.place, examples[0].motion, False, examples[0].goal, here.store.settings,
-        count=len(rows), at_once=rows, examples=examples, group=group,
-        offset=origin - origin[first][group], names=names, values=values, aux=aux,
-    )  # fmt: skip
+def _read_aux(entries: Entries, points: Ints) -> Floats | None:
+    """Return auxiliary axes, (k, a), by rows of the variable file; None for none."""
+    found = None
+    layout = np.where(points >= 0, entries.layout[np.maximum(points, 0)], -1)
+    for number, mine in split_by(layout):
+        axes = entries.layouts[number].axes if number >= 0 else ()
+        for column, axis in enumerate(axes):
+            if 1 <= axis <= MOST_AXES:
+                if found is None:
+                    found = np.full((len(points), MOST_AXES), np.nan)
+                found[mine, axis - 1] = entries.aux[points[mine], column]
+    return found
 
 
 def _find_rows(here: Execution, lines: BodyLines, rows: Ints) -> Ints:
