@@ -244,7 +244,8 @@ class BlockMachine(Interpreter[S]):
             else:
                 found.names = found.names or [""] * len(rows)
                 self._find_named(scope, rows[mine], mine, move, hidden, found)
-        for mine, other, target in self._by_kind(kind):
+        named = np.where(plain.named[variant], kind, ALONE)  # others are sound
+        for mine, other, target in self._by_kind(named):
             test = self.reader.are_sound
             kind[mine[~find_sound(other, found.origin[mine], target, test)]] = ALONE
         return found
