@@ -115,7 +115,7 @@ class RapidMachine(TaskMachine):
             text = self.texts[routine.file]
             for row in text.where(
                 lambda one: getattr(ir.inside(one), "name", "") in modal,
-                rows.start, rows.stop, by_name=True,
+                rows.start, rows.stop,
             ):  # fmt: skip
                 one = ir.inside(text.statement(row))
                 if isinstance(one, ir.Instruction):

@@ -94,8 +94,8 @@ def read_rapid(source: Source) -> RapidFile:
     # Without its end, calls may stand behind a record.
     ended = (r for r in outline.of("record") if r.ended)
     within = {row for r in ended for row in range(r.first, r.last + 1)}
-    moves = [row for row in text.where(is_move, by_name=True) if row not in within]
-    few = text.where(_lacks_position, by_name=True)
+    moves = [row for row in text.where(is_move) if row not in within]
+    few = text.where(_lacks_position)
     for rows, what in ((few, "has too few positions"), (odd, "is not understood")):
         for row in (row for row in rows if row not in within):
             outline.complain(row, what)

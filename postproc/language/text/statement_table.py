@@ -69,20 +69,15 @@ class Statements(Generic[T]):
         return rows
 
     def where(
-        self,
-        test: Callable[[T], bool],
-        first: int = 0,
-        behind: int | None = None,
-        by_name: bool = False,
+        self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
     ) -> list[int]:
-        """List statements that pass a test, which is asked once for each shape.
+        """List statements that pass a test that no name but what they call decides.
 
         Args:
-            test: The test.
+            test: The test; it is asked once for each form that calls nothing by a name
+                with a digit.
             first: The first row to look at.
             behind: The row behind the last one.
-            by_name: No name but that of what a statement calls decides: it is asked
-                once for each form where that has no digit.
         """
         shape = self.shape[first:behind]
         number, example = templates.number_in_order(shape)
@@ -91,7 +86,7 @@ class Statements(Generic[T]):
             form = int(self.said.form[own])
             if form not in known:
                 one = self.said.said[form]
-                known[form] = test(one) if by_name and not _calls_open(one) else None
+                known[form] = None if _calls_open(one) else test(one)
             found = known[form]
             passed[k] = test(self.said[own]) if found is None else found
         rows = first + np.flatnonzero(passed[number])
