@@ -126,11 +126,6 @@ class GoalReader(ABC):
     def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
         """Tell which numbers, (m, w), are those of a target, (m,)."""
 
-    @staticmethod
-    @abstractmethod
-    def read_aux(task: Any, numbers: Floats) -> Floats:
-        """Return external axes as they count, (m, 6), by their numbers, likewise."""
-
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read what only this language can go to, None for all else."""
         return None

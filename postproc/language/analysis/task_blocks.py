@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints, chunks
+from postproc.arrays import Ints
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Points, Scope
 from postproc.language.analysis.call_context import At, Context
@@ -33,6 +33,7 @@ from postproc.language.analysis.move_blocks import (
 from postproc.language.analysis.symbols import TaskSymbols, element_of, whole
 from postproc.language.text.symbol_column import NameColumn
 
+OUTSIDE = 6  # external axes
 ALONE = -1  # kind of a target that is read by itself
 
 
@@ -174,7 +175,7 @@ class BlockMachine(Interpreter[S]):
         names = NameColumn(targets.names) if any(targets.names) else None
         return MoveBlock.of(
             chosen, rows, targets.origin, modes=here.modes, points=here.points,
-            names=names, aux=self._read_aux(targets, *chosen[:2]),
+            names=names,
         )  # fmt: skip
 
     def _read_one(self, at: At, row: int, here: Any) -> FoundVisit:
@@ -192,30 +193,16 @@ class BlockMachine(Interpreter[S]):
 
     def _tell_apart(self, targets: BlockTargets) -> list[Ints]:
         """Return what tells moves apart of which one cannot stand for the other."""
-        columns = [targets.variant, targets.kind]
-        for at in self.reader.told_apart:
+        columns, width = [targets.variant, targets.kind], len(self.reader.told_apart)
+        for at in range(width + OUTSIDE):
             own = np.zeros(len(targets.kind))
             for mine, text, target in self._by_kind(targets.kind):
-                begin = targets.origin[mine]
-                own[mine] = numbers_at(text, begin, target.slots[at : at + 1])[:, 0]
-            columns.append(own.view(np.int64))
+                flags = [target.slots[k] for k in self.reader.told_apart]
+                slot = [*flags, *target.aux][at : at + 1]
+                own[mine] = numbers_at(text, targets.origin[mine], slot)[:, 0]
+            bits = own.view(np.int64)
+            columns += [bits] if (bits != bits[:1]).any() else []
         return columns
-
-    def _read_aux(
-        self, targets: BlockTargets, examples: Sequence[FoundVisit], group: Ints
-    ) -> Floats | None:
-        """Return external axes of moves, None where those of the examples are alike."""
-        found, given = None, np.array([one.goal.aux for one in examples])
-        read, task = self.reader.read_aux, self.task
-        for mine, text, target in self._by_kind(targets.kind):
-            for some in (mine[k] for k in chunks(len(mine))):
-                aux = read(task, numbers_at(text, targets.origin[some], target.aux))
-                if found is None:
-                    if np.array_equal(aux, given[group[some]], equal_nan=True):
-                        continue
-                    found = given[group]
-                found[some] = aux
-        return found
 
     def _by_kind(self, kind: Ints) -> Iterator[tuple[Ints, Any, TargetSlots]]:
         """Yield the moves of each kind, and the text that says where they go, and how.

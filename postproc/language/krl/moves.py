@@ -251,13 +251,6 @@ class KrlGoal(goals.GoalReader):
                 found &= flags < (_SOUND_STATUS if column == 6 else LARGEST)
         return found
 
-    @staticmethod
-    def read_aux(task: symbols.KrlTask, numbers: Floats) -> Floats:
-        """Return the external axes that count, see `_outside`."""
-        declared = [axis in task.start.aux for axis in range(1, 7)]
-        found: Floats = np.where((numbers != 0.0) | declared, numbers, np.nan)
-        return found
-
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read home positions, where the arm is, and products of frames."""
         match operand:

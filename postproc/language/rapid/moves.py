@@ -297,12 +297,6 @@ class RapidGoal(goals.GoalReader):
         turned: Bools = (numbers[:, 3:7] ** 2).sum(axis=1) > SHORTEST**2
         return known if target.joints else known & turned
 
-    @staticmethod
-    def read_aux(task: RapidTask, numbers: Floats) -> Floats:
-        """Return the external axes that there are."""
-        found: Floats = np.where(np.abs(numbers) > UNUSED, np.nan, numbers)
-        return found
-
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read Offs and RelTool: the point is moved along."""
         if not isinstance(operand, ir.FunctionCall) or operand.name not in SHIFTS:
