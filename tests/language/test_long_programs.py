@@ -11,10 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.compensation.program import read_program
-from postproc.language.analysis import to_visits
+from postproc.language.analysis import move_blocks, task_blocks, to_visits
 from postproc.language.krl import files as krl_files
+from postproc.language.pdl2 import move_blocks as pdl2_blocks
 from postproc.language.text.statement_table import StatementText
 from tests.bench.languages import FLY, lengthened, milled, written
+from tests.language.named_points import name_points
 from tests.language.neutral_job import LANGUAGES
 
 ONCE, MORE = 4_000, 9  # moves, and times
@@ -114,6 +116,13 @@ def test_twice_the_taught_moves_take_twice_the_calls(bench_cell):
     assert counts[1] < 2.3 * counts[0]
 
 
+def elements_of(one):
+    """Count the elements of arrays and lists, in any depth."""
+    if isinstance(one, np.ndarray):
+        return one.size
+    return sum(map(elements_of, one)) if isinstance(one, (list, tuple)) else 1
+
+
 class CountedArrays:
     """numpy, which counts the elements that its functions take and give.
 
@@ -131,11 +140,20 @@ class CountedArrays:
 
         def counted(*given, **options):
             found = made(*given, **options)
-            sized = (one for one in (*given, found) if not isinstance(one, type))
-            self.elements += sum(map(np.size, sized))
+            self.elements += elements_of((given, found))
             return found
 
         return counted
+
+
+def work_of(files, cell, monkeypatch, *modules):
+    """Count the calls, and the elements of arrays in some modules, of reading."""
+    arrays = CountedArrays()
+    for module in modules:
+        monkeypatch.setattr(module, "np", arrays)
+    calls = calls_of(lambda: read_program(files, cell))
+    monkeypatch.undo()
+    return calls, arrays.elements
 
 
 def measured(jobs, name, n):
@@ -158,13 +176,30 @@ def test_twice_the_measured_moves_are_twice_the_work(
     """Functions of arrays are few, whatever they take: their elements count."""
     work = []
     for n in (200, 400):
-        arrays, files = CountedArrays(), measured(jobs, name, n)
-        monkeypatch.setattr(to_visits, "np", arrays)
-        calls = calls_of(lambda files=files: read_program(files, bench_cell))
-        monkeypatch.undo()
+        files = measured(jobs, name, n)
+        work.append(work_of(files, bench_cell, monkeypatch, to_visits))
         visits = read_program(files, bench_cell).visits
         assert sum(map(bool, visits.place.measure_id)) == n
-        work.append((calls, arrays.elements))
+    (few, small), (many, large) = work
+    assert many < 2.2 * few
+    assert large < 2.2 * small
+
+
+@pytest.mark.parametrize("in_array", [False, True])
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_twice_the_named_points_are_twice_the_work(
+    name, in_array, bench_cell, monkeypatch
+):
+    """Every move has a speed of its own where its language says one in it."""
+    work = []
+    for n in (200, 400):
+        files = name_points(written(milled(bench_cell, n))[name], name, in_array)
+        first, *moves = files[name].split(b",vWork,zone1,")
+        slower = (b",vWork\\V:=%d,zone1," % k + one for k, one in enumerate(moves))
+        files[name] = b"".join([first, *slower])
+        read_program(files, bench_cell)
+        modules = to_visits, move_blocks, task_blocks, pdl2_blocks
+        work.append(work_of(files, bench_cell, monkeypatch, *modules))
     (few, small), (many, large) = work
     assert many < 2.2 * few
     assert large < 2.2 * small
