@@ -5,14 +5,18 @@ import re
 import sys
 import tracemalloc
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.compensation.program import read_program
+from postproc.language.analysis import move_blocks, task_blocks, to_visits
 from postproc.language.krl import files as krl_files
+from postproc.language.pdl2 import move_blocks as pdl2_blocks
 from postproc.language.text.statement_table import StatementText
-from tests.bench.languages import lengthened, milled, written
+from tests.bench.languages import FLY, lengthened, milled, written
+from tests.language.named_points import name_points
 from tests.language.neutral_job import LANGUAGES
 
 ONCE, MORE = 4_000, 9  # moves, and times
@@ -110,3 +114,92 @@ def test_twice_the_taught_moves_take_twice_the_calls(bench_cell):
     counts = [calls_of(lambda job=job: read_program(job, bench_cell))
               for job in (half, whole)]  # fmt: skip
     assert counts[1] < 2.3 * counts[0]
+
+
+def elements_of(one):
+    """Count the elements of arrays and lists, in any depth."""
+    if isinstance(one, np.ndarray):
+        return one.size
+    return sum(map(elements_of, one)) if isinstance(one, (list, tuple)) else 1
+
+
+class CountedArrays:
+    """numpy, which counts the elements that its functions take and give.
+
+    Attributes:
+        elements: How many there were.
+    """
+
+    def __init__(self) -> None:
+        self.elements = 0
+
+    def __getattr__(self, name):
+        made = getattr(np, name)
+        if isinstance(made, type) or not callable(made) or name == "searchsorted":
+            return made  # that one takes the logarithm
+
+        def counted(*given, **options):
+            found = made(*given, **options)
+            self.elements += elements_of((given, found))
+            return found
+
+        return counted
+
+
+def work_of(files, cell, monkeypatch, *modules):
+    """Count the calls, and the elements of arrays in some modules, of reading."""
+    arrays = CountedArrays()
+    for module in modules:
+        monkeypatch.setattr(module, "np", arrays)
+    calls = calls_of(lambda: read_program(files, cell))
+    monkeypatch.undo()
+    return calls, arrays.elements
+
+
+def measured(jobs, name, n):
+    """Take the first moves of a program; each is measured, and none is like another."""
+    comment = {"job.pdl": "--", "job.mod": "!", "job.src": ";"}[name]
+    halt = {"job.pdl": "PAUSE", "job.mod": "Break;", "job.src": "HALT"}[name]
+    files = jobs[name][0]
+    moves = [*FLY.finditer(files[name])]
+    own = [f"{comment} MEASURE h{k}\n{move[0].decode()}\n{halt}\n"
+           for k, move in enumerate(moves[:n])]  # fmt: skip
+    begin, end = moves[0].start(), moves[-1].end() + 1
+    text = files[name][:begin] + "".join(own).encode() + files[name][end:]
+    return {**files, name: text}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_twice_the_measured_moves_are_twice_the_work(
+    name, jobs, bench_cell, monkeypatch
+):
+    """Functions of arrays are few, whatever they take: their elements count."""
+    work = []
+    for n in (200, 400):
+        files = measured(jobs, name, n)
+        work.append(work_of(files, bench_cell, monkeypatch, to_visits))
+        visits = read_program(files, bench_cell).visits
+        assert sum(map(bool, visits.place.measure_id)) == n
+    (few, small), (many, large) = work
+    assert many < 2.2 * few
+    assert large < 2.2 * small
+
+
+@pytest.mark.parametrize("in_array", [False, True])
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_twice_the_named_points_are_twice_the_work(
+    name, in_array, bench_cell, monkeypatch
+):
+    """Every move has a speed of its own where its language says one in it."""
+    work = []
+    for n in (200, 400):
+        files = name_points(written(milled(bench_cell, n))[name], name, in_array)
+        first, *moves = files[name].split(b",vWork,zone1,")
+        slower = (b",vWork\\V:=%d,zone1," % k + one for k, one in enumerate(moves))
+        files[name] = b"".join([first, *slower])
+        read_program(files, bench_cell)
+        modules = to_visits, move_blocks, task_blocks, pdl2_blocks
+        work.append(work_of(files, bench_cell, monkeypatch, *modules))
+    (few, small), (many, large) = work
+    assert many < 2.2 * few
+    assert large < 2.2 * small

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Hashable
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Reason
@@ -68,6 +68,14 @@ class FoundGoal:
     holds: frozenset[int] = frozenset()
     names: frozenset[str] = frozenset()
     doubtful: frozenset[str] = frozenset()
+
+    def behind(self, offset: int, name: str) -> Self:
+        """Return a goal that is written alike, so many numbers behind this one."""
+        slots, follows = (
+            tuple([at + offset if at >= 0 else -1 for at in some])
+            for some in (self.slots, self.follows)
+        )
+        return replace(self, slots=slots, follows=follows, name=name)
 
     @property
     def writes(self) -> tuple[int, ...]:
@@ -169,8 +177,7 @@ class FoundVisit:
         arc_angle: As in `Visits` [rad].
         block: Tells the curves apart that visits are points of, None for none.
         curved: As in `Visits`.
-        count: How many moves it stands for that follow each other and differ only in
-            where they go: this one is the first.
+        count: How many moves it stands for, which differ only in where they go.
         points: What points hold where it was read.
         left: With what the program went on behind it the last time: modes, points, and
             where else the arm may come from.
@@ -197,11 +204,11 @@ class FoundVisit:
         return row
 
     @property
-    def rows(self) -> slice | Ints:
+    def rows(self) -> Sequence[int] | Ints:
         """The rows of all moves that it stands for."""
-        return slice(self.row, self.row + self.count)
+        return [self.row]
 
     @property
-    def is_run(self) -> bool:
-        """Whether it stands for more than itself."""
-        return self.count > 1
+    def arrivals(self) -> Sequence[FoundVisit]:
+        """What tells the arrivals that it stands for apart."""
+        return [self]

@@ -10,10 +10,12 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any, ClassVar, TypeVar
 
+from postproc.arrays import Bools, Floats
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import AssignedPoint, Scope
 from postproc.language.analysis.found_goals import FoundGoal, FoundShift, hold_numbers
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.pose_encoding import Dialect
@@ -62,6 +64,8 @@ class GoalReader(ABC):
         shout: Names are upper case in messages.
         system: Why numbers of files that are not rewritten must stay.
         outlives: Why those stay that data of no routine are given, "" if they need not.
+        told_apart: Numbers of targets, by their place, that tell moves apart which are
+            read at once.
     """
 
     task: TaskSymbols[Any]
@@ -71,6 +75,7 @@ class GoalReader(ABC):
     shout: ClassVar[bool] = False
     system: ClassVar[str]
     outlives: ClassVar[str] = ""
+    told_apart: ClassVar[Sequence[int]] = ()
 
     # What a language says.
 
@@ -100,6 +105,26 @@ class GoalReader(ABC):
             name: Of the point.
             slot: Its first number, -1 where none is written.
         """
+
+    @abstractmethod
+    def goal_of(
+        self,
+        target: TargetSlots,
+        numbers: Sequence[float | None],
+        outside: Sequence[float | None],
+    ) -> FoundGoal:
+        """Return where numbers lead, without where they stand.
+
+        Args:
+            target: Which of them are written.
+            numbers: Of the target, w, None for what is not written.
+            outside: Of external axes, likewise.
+        """
+
+    @staticmethod
+    @abstractmethod
+    def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+        """Tell which numbers, (m, w), are those of a target, (m,)."""
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read what only this language can go to, None for all else."""
@@ -173,6 +198,36 @@ class GoalReader(ABC):
 
     def read_point(self, operand: ir.Operand | None) -> FoundGoal:
         """Read a point that is written or named."""
+        return self._read_written(operand) or self._read_any(operand)
+
+    def _read_written(self, operand: ir.Operand | None) -> FoundGoal | None:
+        """Read a point all of whose numbers stand in one statement, None for others."""
+        file, row, written, name = self.here.file, self.here.row, operand, ""
+        if isinstance(operand, ir.DataObject) and not operand.steps:
+            found = self.task.constant(operand.name, self.here)
+            if found is None:
+                return None
+            file, row, written = found[0], found[1].row, found[1].value
+            name = operand.name
+        target = self.task.slots_of(written)
+        if target is None:
+            return None
+        text, begin = self.task.files[file].text, self.task.numbering.first[file]
+        first = int(text.first[row])
+        numbers, outside = (
+            [float(text.value[first + at]) if at >= 0 else None for at in some]
+            for some in (target.slots, target.aux)
+        )
+        if not all(x is None or math.isfinite(x) for x in (*numbers, *outside)):
+            return None
+        goal = self.goal_of(target, numbers, outside)
+        begin += first
+        slots = tuple([begin + at if at >= 0 else -1 for at in target.slots])
+        goal = replace(goal, slots=slots, follows=(-1,) * len(slots))
+        return self.name_goal(goal, name) if name else goal
+
+    def _read_any(self, operand: ir.Operand | None) -> FoundGoal:
+        """Read a point that is computed, or a part of other data."""
         name = operand.name if isinstance(operand, ir.DataObject) else ""
         goal = self.read_value(self.task.value(operand, self.here))
         if goal is None:
@@ -227,18 +282,20 @@ class GoalReader(ABC):
         steps = operand.steps if isinstance(operand, ir.DataObject) else ()
         spelt = ""
         for step in steps:
-            inside = self._spell_index(self._index(step) or ())
+            inside = self.spell_index(self._index(step) or ())
             spelt += f".{step}" if isinstance(step, str) else inside
         return spelt
 
-    def _spell_index(self, index: tuple[int, ...]) -> str:
-        return f"{self.brackets[0]}{','.join(map(str, index))}{self.brackets[1]}"
+    @classmethod
+    def spell_index(cls, index: tuple[int, ...]) -> str:
+        """Spell the index of an element."""
+        return f"{cls.brackets[0]}{','.join(map(str, index))}{cls.brackets[1]}"
 
     # What assignments gave.
 
     def _read_held(self, held: AssignedPoint) -> FoundGoal:
         """Read the destination that assignments gave to a point."""
-        name = held.name + (self._spell_index(held.index) if held.index else "")
+        name = held.name + (self.spell_index(held.index) if held.index else "")
         goal = held.goal or self.unknown(AT_RUN_TIME)
         goal = replace(goal, names=goal.names | held.names)
         why = []

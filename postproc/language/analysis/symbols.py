@@ -24,6 +24,7 @@ from postproc.language.analysis.assigned_points import (
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.uses import NamesUsed, match_arguments
 from postproc.language.analysis.values import (
     ALIKE,
@@ -45,6 +46,7 @@ from postproc.language.analysis.values import (
 from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
+from postproc.language.text.templates import name_index
 
 DEEPEST = 20  # names that stand for names
 F = TypeVar("F", bound=TaskFile)
@@ -91,6 +93,9 @@ class TaskSymbols(ABC, Generic[F]):
     )
     _doubled: set[Place] = field(default_factory=set, init=False)
     _names: dict[int, tuple[ir.Operand, frozenset[str]]] = field(
+        default_factory=dict, init=False
+    )
+    _written: dict[int, tuple[ir.Operand, TargetSlots | None]] = field(
         default_factory=dict, init=False
     )
     _changes: dict[int, tuple[ir.SourceStatement, Sequence[ir.DataObject]]] = field(
@@ -185,6 +190,35 @@ class TaskSymbols(ABC, Generic[F]):
     def values_of(self, one: ir.SourceStatement) -> list[ir.Node]:
         """List the values that a statement takes when it runs, with all in them."""
         return ir.walk(one)
+
+    def free_name(self, one: ir.SourceStatement) -> int:
+        """Return which open name is only where a move goes, -1 for none.
+
+        What a move takes and changes is the same whatever point it goes to.
+        """
+        to = self.plain_end(one)
+        if not isinstance(to, ir.DataObject) or to.steps:
+            return -1
+        return name_index(to.name)
+
+    def plain_end(self, one: Any) -> ir.Operand | None:
+        """Return where a move goes that does nothing else, None for all other lines.
+
+        But for data by name, and numbers, nothing stands in it that could differ.
+        """
+        return None
+
+    @abstractmethod
+    def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
+        """Return the numbers of a written target, None for all other operands."""
+
+    def slots_of(self, operand: ir.Operand | None) -> TargetSlots | None:
+        """Read a value once for all statements of a form, see `read_slots`."""
+        if operand is None:
+            return None
+        if id(operand) not in self._written:
+            self._written[id(operand)] = operand, self.read_slots(operand)
+        return self._written[id(operand)][1]
 
     def note_in(self, uses: NamesUsed, file: F, one: ir.SourceStatement) -> None:
         """Note what a statement of a file changes and takes."""
@@ -379,7 +413,8 @@ class TaskSymbols(ABC, Generic[F]):
         for routine in self.routines_by_file[number] if self.dead else ():
             if routine.key in self.dead:
                 live[routine.inside.start : routine.inside.stop] = False
-        return [text.said[k] for k in np.unique(text.shape[live]).tolist()]
+        shapes = text.said.distinct(np.unique(text.shape[live]), self.free_name)
+        return [text.said[k] for k in shapes.tolist()]
 
     @cached_property
     def dead(self) -> frozenset[tuple[int, int]]:
@@ -664,8 +699,12 @@ class TaskSymbols(ABC, Generic[F]):
         if not found:
             return None, (), ""
         file, datum = found
-        there = self.scope_of_datum(file, datum)
-        return self.value(datum.value, there, depth), steps, datum.type
+        there, written = self.scope_of_datum(file, datum), datum.value
+        if datum.dimensions and steps and not isinstance(steps[0], str):
+            index = self.index(steps[0], here)
+            written = element_of(written, index) if index else None
+            steps = steps[1:]
+        return self.value(written, there, depth), steps, datum.type
 
     def index(self, step: ir.ElementStep | str, here: Scope) -> tuple[int, ...] | None:
         """Return the index of an element from 1, None where it is not known."""
@@ -918,6 +957,14 @@ def _without_components(data: ir.DataObject) -> ir.DataObject:
     return replace(data, steps=steps[:count]) if steps[count:] else data
 
 
+def element_of(operand: ir.Operand | None, index: Sequence[int]) -> ir.Operand | None:
+    """Return an element of an array that is written, None where it has no such."""
+    for at in index:
+        items = operand.items if isinstance(operand, ir.Composite) else ()
+        operand = items[at - 1] if 0 < at <= len(items) else None
+    return operand
+
+
 LARGEST = 1 << 31  # whole number that counts or names anything
 
 
@@ -942,7 +989,10 @@ def _is_loop(one: ir.SourceStatement) -> bool:
 
 def holds_odd(one: ir.SourceStatement) -> bool:
     """Return True if a statement, or what a condition leads to, is not understood."""
-    return any(isinstance(part, ir.NotUnderstood) for part in ir.walk(one))
+    if isinstance(one, ir.NotUnderstood):
+        return True
+    inside = (part for part in one.children() if isinstance(part, ir.SourceStatement))
+    return any(map(holds_odd, inside))
 
 
 def _make_number(value: float, slot: int = -1) -> WrittenNumber | None:

@@ -9,9 +9,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, TypeVar
 
-import numpy as np
-
-from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import NO_POINTS, Points, Scope
@@ -19,13 +16,10 @@ from postproc.language.analysis.call_context import CALLED, At, Context
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.control_flow import ControlFlow
 from postproc.language.analysis.declarations import TaskRoutine
-from postproc.language.analysis.goals import GoalReader
 from postproc.language.analysis.interpreter import (
     NOT_UNROLLED,
-    Interpreter,
     calls_around,
 )
-from postproc.language.analysis.move_runs import Runs, find_runs, rows_of_lines
 from postproc.language.analysis.origins import (
     MANY,
     NOWHERE,
@@ -34,6 +28,7 @@ from postproc.language.analysis.origins import (
     join_origins,
 )
 from postproc.language.analysis.symbols import TaskSymbols
+from postproc.language.analysis.task_blocks import BlockMachine
 from postproc.language.text.statement_table import StatementText
 from postproc.language.visits import Diagnostic
 
@@ -138,7 +133,7 @@ M = TypeVar("M", bound="TaskMachine")
 
 
 @dataclass
-class TaskMachine(Interpreter[Arrived]):
+class TaskMachine(BlockMachine[Arrived]):
     """The ways through a task.
 
     Attributes:
@@ -147,25 +142,17 @@ class TaskMachine(Interpreter[Arrived]):
             lead to the next statement or into a routine.
         passed: Statements that lead to the next one and do nothing.
         still: Names of what is known not to move, nor to change how moves are made.
-        reader: Reads where moves lead.
-        task: What its names mean.
         diagnostics: What else was found.
         beside: Statements that run in ways that are not followed: file, first row, and
             the row behind the last.
-        at_once: Moves that differ only in where they go are read at once.
     """
 
     procedures: ClassVar[Collection[str]]
     acting: ClassVar[tuple[type[ir.SourceStatement], ...]]
     passed: ClassVar[tuple[type[ir.SourceStatement], ...]]
     still: ClassVar[Collection[str]]
-    reader: ClassVar[type[GoalReader]]
-    task: TaskSymbols[Any] = field(kw_only=True)
     diagnostics: set[Diagnostic] = field(default_factory=set)
     beside: set[tuple[int, int, int]] = field(default_factory=set)
-    at_once: bool = True
-    _runs: dict[tuple[int, int], Runs] = field(default_factory=dict)
-    _runs_in: dict[Context, Runs] = field(default_factory=dict)
     _numbers: dict[At, list[int]] = field(default_factory=dict)
     _read: dict[tuple[int, int], tuple[Effects, list[TaskRoutine]]] = field(
         default_factory=dict
@@ -180,11 +167,6 @@ class TaskMachine(Interpreter[Arrived]):
     def __post_init__(self) -> None:
         """Let assignments read where moves to points lead."""
         self.task.reader = self.reader
-
-    @property
-    def texts(self) -> Sequence[Any]:
-        """The statements of all files, the main one first."""
-        return self.task.numbering.texts
 
     # What a language says.
 
@@ -214,21 +196,9 @@ class TaskMachine(Interpreter[Arrived]):
     def is_move(self, one: ir.SourceStatement) -> bool:
         """Return True if a statement moves."""
 
-    @abstractmethod
-    def places_of(self, one: Any) -> Sequence[int] | None:
-        """Return the numbers of a line to a written point that say only where it is.
-
-        None for all other statements, and for moves that do more than move.
-        """
-
-    @staticmethod
-    def is_plain(numbers: Floats) -> Bools:
-        """Tell which of such numbers, (m, k), need no word of their own, (m,)."""
-        return all_in_rows(np.isfinite(numbers))
-
-    def apart(self, context: Context) -> set[int] | None:
-        """Return rows that are read by themselves, None where all are."""
-        return set()
+    def planner_of(self, one: Any) -> str:
+        """Return what plans a move, where there are several that tell moves apart."""
+        return ""
 
     def is_asked(self, part: ir.Node) -> bool:
         """Return True if it counts that a statement asks for something as it runs."""
@@ -298,7 +268,10 @@ class TaskMachine(Interpreter[Arrived]):
         return found
 
     def is_beside(self, one: Any) -> bool:
-        """Return True if a statement runs otherwise than it is followed."""
+        """Return True if a statement runs otherwise than it is followed.
+
+        No name with a digit decides that.
+        """
         return False
 
     def list_handlers(self, routine: TaskRoutine) -> Iterable[tuple[int, int, int]]:
@@ -353,13 +326,29 @@ class TaskMachine(Interpreter[Arrived]):
 
     def run_block(self, at: At, state: Arrived) -> tuple[int, Arrived | None] | None:
         """Run moves that follow each other; the visit of the first stands for all."""
-        behind = self._runs_of(at.context).get(at.row)
+        behind = self.runs_of(at.context).get(at.row)
         if behind is None:
             return None
-        after = self.act(at, at.statement, state)
-        (number,) = self._numbers[at]
-        self.visits[number].count = behind - at.row
-        return behind, after
+        known = self._numbers.get(at)
+        if known is None:
+            known = self._numbers[at] = [len(self.visits)]
+            self.keys.append((at.context, at.job_row, 0))
+            self.visits.append(self.read_block(at, behind, state))
+        else:
+            self._read_block_again(at, behind, state, known[0])
+        after = self._come_from(known, at, state)
+        return behind, None if self._went_on(at, after) else after
+
+    def _read_block_again(
+        self, at: At, behind: int, here: Arrived, number: int
+    ) -> None:
+        """Read a block with what is known by now, see `_read_again`."""
+        old = self.visits[number]
+        modes = old.modes.join(here.modes)
+        if (modes, here.points) != (old.modes, old.points):
+            new = self.read_block(at, behind, here.with_modes(modes))
+            new.origins, new.left = old.origins, old.left
+            self.visits[number] = new
 
     def before(self, at: At, one: ir.SourceStatement, state: Arrived) -> Arrived:
         """Allow for what the functions of a statement do."""
@@ -404,28 +393,6 @@ class TaskMachine(Interpreter[Arrived]):
         """Go back to where the routine was called."""
         context = context.call
         self.return_to_caller(context, self.at_return(context, state))
-
-    def _runs_of(self, context: Context) -> Runs:
-        """Return which moves are read at once in a call, or a round of a loop.
-
-        They are found in the statements of a routine once for all calls of it.
-        """
-        if context not in self._runs_in:
-            apart = self.apart(context) if self.at_once else None
-            place = context.place
-            key = place.scope.file, place.flow.first
-            if apart is not None and key not in self._runs:
-                apart = apart | self._taught_rows[place.scope.file]
-                alike = self.places_of, self.is_plain
-                self._runs[key] = find_runs(place.text, place.flow, apart, *alike)
-            self._runs_in[context] = {} if apart is None else self._runs[key]
-        return self._runs_in[context]
-
-    @cached_property
-    def _taught_rows(self) -> Sequence[set[int]]:
-        """Statements of every file that stand on lines that are marked as taught."""
-        pairs = zip(self.texts, self.task.taught_lines, strict=False)
-        return [rows_of_lines(text, lines) for text, lines in pairs]
 
     # Calls and moves.
 
@@ -587,6 +554,10 @@ class TaskMachine(Interpreter[Arrived]):
             found[0].points = here.points
         else:
             self._read_again(at, one, here, known)
+        return self._come_from(known, at, here)
+
+    def _come_from(self, known: Sequence[int], at: At, here: Arrived) -> Arrived:
+        """Note how the arm comes to visits; it then stands at the last of them."""
         first = self.visits[known[0]]
         first.origins = join_origins(first.origins, here.origins, self.lost)
         if MANY in first.origins:
@@ -746,7 +717,7 @@ class TaskMachine(Interpreter[Arrived]):
                 if routine.rows.head.kind not in self.procedures:
                     yield file, routine.inside.start, routine.inside.stop
                 yield from self.list_handlers(routine)
-            for row in text.where(self.is_beside):
+            for row in text.of_kind(self.is_beside):
                 yield file, row, row + 1
 
     def goals_of(self, file: int, row: int) -> Iterator[Any]:

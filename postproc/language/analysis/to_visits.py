@@ -31,6 +31,7 @@ from postproc.language.analysis.found_goals import (
     array_of,
     whole_name,
 )
+from postproc.language.analysis.move_blocks import MoveBlock
 from postproc.language.analysis.origins import Origins, number_origins
 from postproc.language.analysis.task_machine import TaskMachine
 from postproc.language.analysis.visit_columns import (
@@ -112,17 +113,20 @@ BESIDE = (
 
 
 class Collector(ABC):
-    """Makes visits of what a machine has found, r, in the order of the program: n.
+    """Makes visits of what a machine has found, in the order of the program: n.
 
     Attributes:
         dialect: What the numbers mean.
         comments: How the language writes them.
         machine: It has followed all ways.
         numbering: The numbers of all files.
-        found: What it has found.
-        counts, begin: How many visits each stands for, and the first of them, (r,).
+        runs: What it has found: arrivals, and blocks of them, r.
+        counts: How many visits each stands for, (r,).
         last: The last of them, by the number that the machine knows it by, (r,).
-        owner, inside: Whose a visit is, and its place there, (n,).
+        found: The arrivals, each of which may stand for some visits of a block, g.
+        begin: The first visit of each, (g,).
+        owner, row: Which of them a visit is, and its row, (n,).
+        blocks: First visit and first arrival of every block, and the block.
         columns: The visits.
     """
 
@@ -134,15 +138,27 @@ class Collector(ABC):
         self.machine, self.numbering = machine, numbering
         keys = [(Point(context, at), k) for context, at, k in machine.keys]
         order = sorted(range(len(keys)), key=keys.__getitem__)
-        self.found: list[Any] = [machine.visits[k] for k in order]
-        self.counts = np.array([one.count for one in self.found], np.int64)
-        self.begin = np.cumsum(self.counts) - self.counts
+        self.runs: list[Any] = [machine.visits[k] for k in order]
+        self.counts = np.array([len(one.rows) for one in self.runs], np.int64)
+        start = np.cumsum(self.counts) - self.counts
         self.last = np.empty(len(order), np.int64)
-        self.last[order] = self.begin + self.counts - 1
-        every = np.arange(len(order), dtype=np.int32)
-        self.owner: Indices = np.repeat(every, self.counts)
-        own = self.begin.astype(np.int32)[self.owner]
-        self.inside: Indices = np.arange(len(own), dtype=np.int32) - own
+        self.last[order] = start + self.counts - 1
+        parts = [one.arrivals for one in self.runs]
+        self.found: list[Any] = [one for some in parts for one in some]
+        several = np.array([len(some) for some in parts], np.int64)
+        base = np.cumsum(several) - several
+        self.owner: Indices = np.repeat(base.astype(np.int32), self.counts)
+        first = np.array([one.rows[0] for one in self.runs], np.int32)
+        self.row: Indices = np.repeat(first, self.counts)
+        self.begin = np.repeat(start, several)
+        self.blocks = list[tuple[int, int, MoveBlock]]()
+        for k, one in enumerate(self.runs):
+            if isinstance(one, MoveBlock):
+                own, at = slice(start[k], start[k] + len(one.rows)), int(base[k])
+                self.blocks.append((int(start[k]), at, one))
+                self.row[own], self.owner[own] = one.rows, at + one.group
+                examples = np.unique(one.group, return_index=True)[1]
+                self.begin[at : at + len(examples)] += examples
 
     # What a language says.
 
@@ -153,15 +169,6 @@ class Collector(ABC):
     @abstractmethod
     def list_moves(self) -> Sequence[Indices]:
         """Return the rows of the moves of every file that is followed."""
-
-    @abstractmethod
-    def fill_run(self, v: Any, rows: slice) -> None:
-        """Fill the columns of moves that stand for more than the first of them.
-
-        Args:
-            v: The first of them.
-            rows: Their visits; what is said of an arrival has been filled.
-        """
 
     @abstractmethod
     def find_uses(self, literal: Indices) -> tuple[dict[int, str], Indices]:
@@ -183,8 +190,9 @@ class Collector(ABC):
     def count_axes(self) -> int:
         """Return the last auxiliary axis that targets give a value of."""
         aux = np.array([v.goal.aux for v in self.found], float)
-        used = ~np.isnan(aux).all(axis=0) if len(aux) else []
-        return int(np.flatnonzero(used).max(initial=-1)) + 1
+        several = [aux, *(one.aux for _, _, one in self.blocks if one.aux is not None)]
+        used = [~np.isnan(one).all(axis=0) for one in several if len(one)]
+        return int(np.flatnonzero(np.any(used, axis=0)).max(initial=-1)) + 1
 
     # What follows from that.
 
@@ -197,9 +205,8 @@ class Collector(ABC):
         self._fill_places()
         self.fill_goals(self.begin, [v.goal for v in self.found])
         self._fill_conditions()
-        for v, begin in zip(self.found, self.begin.tolist(), strict=True):
-            if v.is_run:
-                self.fill_run(v, slice(begin, begin + v.count))
+        for begin, _, block in self.blocks:
+            self._fill_block(block, begin)
         self.complete()
         self._mark_pauses()
         if self.machine.exhausted:
@@ -227,10 +234,9 @@ class Collector(ABC):
         """Fill where moves stand, and how they move."""
         c, found = self.columns, self.found
         c.file[:] = self.spread((v.scope.file for v in found), np.int64)
-        row = self.spread((v.row for v in found), np.int32) + self.inside
         for number, text in enumerate(self.numbering.texts):
             mine = c.file == number
-            c.line[mine] = text.begin_line[row[mine]]
+            c.line[mine] = text.begin_line[self.row[mine]]
         c.kind[:] = self.spread((v.motion for v in found), np.int64)
         c.via[:] = self.spread((v.via for v in found), bool)
 
@@ -253,20 +259,50 @@ class Collector(ABC):
         if written:
             c.slots[visit[written]] = [goals[k].writes for k in written]
 
-    def fill_numbers(
-        self, visit: Ints | slice, slots: Iterable[tuple[int, Ints]], file: int
-    ) -> None:
-        """Fill numbers that stand in moves, and where; column by column: short of room.
+    def _fill_block(self, block: MoveBlock, begin: int) -> None:
+        """Fill the moves of a block that arrivals of others stand for.
 
         Args:
-            visit: The visits, k.
-            slots: Columns of targets, and the numbers of all files there, (k,).
-            file: The file of the moves.
+            block: The block.
+            begin: Its first visit.
         """
-        c, value = self.columns, self.numbering.texts[file].value
-        for column, own in slots:
-            c.slots[visit, column] = own
-            c.values[visit, column] = value[own - self.numbering.first[file]]
+        c = self.columns
+        pairs = zip(block.examples, block.members, strict=True)
+        for example, own in (pair for pair in pairs if len(pair[1]) > 1):
+            visit, goal = begin + own, example.goal
+            for column in (c.meaning, c.shared, c.config, c.config_given, c.taught):
+                column[visit] = column[visit[0]]
+            if goal.writes[0] >= 0:
+                self._fill_numbers(block, visit, own, goal.writes)
+            c.aux[visit] = c.aux[visit[0]]
+            if block.aux is not None:
+                c.aux[visit] = block.aux[own][:, : c.aux.shape[1]]
+            if block.names is not None and goal.name:
+                c.name[visit] = c.names.of(block.names.take(own))
+
+    def _fill_numbers(
+        self, block: MoveBlock, visit: Ints, own: Ints, slots: Sequence[int]
+    ) -> None:
+        """Fill numbers of targets, and where they stand, column by column.
+
+        Args:
+            block: The block.
+            visit: The visits, (m,).
+            own: Which of its moves they are, (m,).
+            slots: The numbers of the target that they are like, -1 for none.
+        """
+        c, behind = self.columns, block.offset[own]
+        file = self.numbering.file_of(slots[0])
+        value, first = self.numbering.texts[file].value, self.numbering.first[file]
+        for column, slot in enumerate(slots):
+            if slot < 0:
+                c.values[visit, column] = c.values[visit[0], column]
+                continue
+            c.slots[visit, column] = at = slot + behind
+            if len(value):
+                c.values[visit, column] = value[at - first]
+            elif block.values is not None:
+                c.values[visit, column] = block.values[own, column]
 
     def _fill_conditions(self) -> None:
         """Fill what moves are carried out with, and why they must stay."""
@@ -291,7 +327,7 @@ class Collector(ABC):
 
     def graph(self) -> visits.Graph:
         """Translate origins to visits in the order of the program."""
-        every = map(self.origins_of, self.found)
+        every = map(self.origins_of, self.runs)
         origins = [number_origins(one, self.last) for one in every]
         return chain_visits(self.counts, origins)
 
@@ -305,7 +341,7 @@ class Collector(ABC):
         missed = [np.zeros(len(text), bool) for text in texts]
         for own, rows in zip(missed, moves, strict=False):
             own[rows] = True
-        for v in self.found:
+        for v in self.runs:
             missed[v.scope.file][v.rows] = False
         lines = (
             np.unique(t.begin_line[own]) for t, own in zip(texts, missed, strict=True)
@@ -327,13 +363,10 @@ class Collector(ABC):
                 at = int(np.searchsorted(last, line))
                 if at < len(rows):
                     ids[-1].setdefault(int(rows[at]), mark)
-        found = dict[int, str]()
-        begins = self.begin.tolist()
-        for v, begin in zip(self.found if any(ids) else (), begins, strict=False):
-            own = {} if v.via else ids[v.scope.file]
-            rows = v.rows
-            each = range(rows.start, rows.stop) if isinstance(rows, slice) else rows
-            found |= {begin + k: own[row] for k, row in enumerate(each) if row in own}
+        found, behind = dict[int, str](), np.cumsum(self.counts).tolist()
+        for v, end in zip(self.runs if any(ids) else (), behind, strict=False):
+            own, begin = {} if v.via else ids[v.scope.file], end - len(v.rows)
+            found |= {begin + k: own[r] for k, r in enumerate(v.rows) if r in own}
         return found
 
 
@@ -344,34 +377,20 @@ class TaskCollector(Collector):
     found: list[FoundVisit]
 
     def __init__(self, machine: Any) -> None:
-        """Find what counts for several: it is filled for all of them."""
+        """Sort what was found."""
         super().__init__(machine, machine.task.numbering)
-        first = dict[int, int]()  # by the numbers that moves write
-        for k, v in enumerate(self.found):
-            if v.goal.writes[0] >= 0:
-                first.setdefault(v.goal.writes[0], k)
-        self.index = {place: k for k, place in enumerate(first)}
-        self.example = [*first.values()]
-        self.followed = self._find_followed()
 
     def list_moves(self) -> Sequence[Indices]:
         """Return the moves of the files of the task."""
         return [file.moves for file in self.machine.task.files]
 
-    def fill_run(self, v: FoundVisit, rows: slice) -> None:
-        """Fill moves that differ in their numbers alone, see `Collector.fill_run`."""
-        c, text = self.columns, self.machine.texts[v.scope.file]
-        for column in (c.meaning, c.values, c.slots, c.name, c.aux, c.shared):
-            column[rows] = column[rows.start]
-        stride = int(text.first[v.row + 1] - text.first[v.row])  # of a statement
-        own, steps = v.goal.writes, stride * np.arange(v.count)
-        places = ((at, slot + steps) for at, slot in enumerate(own) if slot >= 0)
-        self.fill_numbers(rows, places, v.scope.file)
-
     def complete(self) -> None:
         """Fill splines, shifts and taught points, see `Collector.complete`."""
         super().complete()
         c, found = self.columns, self.found
+        first, self.visit_of = np.unique(c.slots[:, 0], return_index=True)
+        self.places: Ints = first.astype(np.int64)
+        self.followed = self._find_followed()
         c.arc_angle = self.spread((v.arc_angle for v in found), float)
         c.block = np.append(self.begin, -1)[_blocks(found)].astype(np.int32)[self.owner]
         c.curved = self.spread((v.curved for v in found), bool)
@@ -387,19 +406,24 @@ class TaskCollector(Collector):
         c.taught = self.spread(self._find_taught(), bool)
 
     def find_uses(self, literal: Indices) -> tuple[dict[int, str], Indices]:
-        """Find it by the first of each run: what pins that one pins its run."""
+        """Find it by the first numbers of targets, see `Collector.find_uses`."""
         pinned = self._find_pinned([*_goals_beside(self.machine)])
         self._hold_for_taught(pinned)
-        texts = dict[int, str]()
-        for k, why in zip(self.example, pinned, strict=True):
-            if why:
-                own = literal[self.begin[k] : self.begin[k] + self.counts[k]]
-                texts |= dict.fromkeys(own[own >= 0].tolist(), why)
-        own = np.append(literal[self.begin[np.array(self.example, np.int64)]], -1)
-        return texts, own[np.maximum(self.followed, -1)][self.owner]
+        known = np.append(literal, -1)
+        own = ((int(known[self._visit_at(at)]), why) for at, why in pinned.items())
+        texts = {number: why for number, why in own if number >= 0}
+        return texts, known[np.maximum(self.followed, -1)][self.owner]
+
+    def _visit_at(self, place: int) -> int:
+        """Return the first visit whose target begins with a number, -1 for none."""
+        at = (
+            int(np.searchsorted(self.places, place)) if place >= 0 else len(self.places)
+        )
+        known = at < len(self.places) and self.places[at] == place
+        return int(self.visit_of[at]) if known else -1
 
     def _find_followed(self) -> Ints:
-        """Find what computed targets move along with, (r,), -1 for none.
+        """Find the visits that computed targets move along with, (g,), -1 for none.
 
         Where a shift can make up for all, the point need be no move's own. Targets do
         not move along with a point that stays.
@@ -409,16 +433,17 @@ class TaskCollector(Collector):
             if v.goal.slots[0] < 0 <= v.goal.follows[0]:
                 none = -1 if v.goal.is_rewritten_by_shift else _NO_LITERAL
                 known = v.goal.target == visits.Meaning.POSE and not v.goal.stays
-                follows[k] = self.index.get(v.goal.point, none) if known else -1
+                at = self._visit_at(v.goal.point) if known else -1
+                follows[k] = none if known and at < 0 else at
         return follows
 
-    def _find_pinned(self, other: Sequence[tuple[FoundGoal, str]]) -> list[str]:
-        """Say why numbers that are written must stay, "" where they need not.
+    def _find_pinned(self, other: Sequence[tuple[FoundGoal, str]]) -> dict[int, str]:
+        """Say why numbers that are written must stay, by the first of each target.
 
         Args:
             other: Where moves go that run beside, and why those numbers stay.
         """
-        found, index = self.found, self.index
+        found, pinned = self.found, dict[int, str]()
         goals = [(v.goal, ANY_ELEMENT.format(v.goal.name)) for v in found]
         # Of moves to an element of an array that is not known.
         elements = {goal.name: why for goal, why in (*goals, *other)
@@ -429,39 +454,57 @@ class TaskCollector(Collector):
         }
         stays = {goal.point: why for goal, why in other}
         stays |= {goal.writes[0]: why for goal, why in other}
-        pinned = []
-        for v in (found[k] for k in self.example):
-            by = v.goal.shift if v.goal.is_rewritten_by_shift else None
-            own = elements.get(array_of(v.goal.name), "") if by is None else by.pins
-            pinned.append(stays.get(v.goal.writes[0], "") or own)
         uncertain = _find_uncertain({*elements}, self.machine.task.uses.copies)
         copied = uncertain.keys() - elements.keys()
-        for v in found:
-            unknown = {v.goal.name, array_of(v.goal.name)} & copied
-            unknown |= v.goal.names & uncertain.keys()
+        seen = set[int]()
+        for goal in self._list_goals(bool(stays or uncertain)):
+            if goal.writes[0] not in seen:
+                by = goal.shift if goal.is_rewritten_by_shift else None
+                own = elements.get(array_of(goal.name), "") if by is None else by.pins
+                _hold(pinned, goal.writes[0], stays.get(goal.writes[0], "") or own)
+                seen.add(goal.writes[0])
+        for goal in self._list_goals(bool(uncertain)):
+            unknown = {goal.name, array_of(goal.name)} & copied
+            unknown |= goal.names & uncertain.keys()
             if unknown:
-                places = v.goal.point, v.goal.writes[0]
-                for at in {index.get(place, -1) for place in places} - {-1}:
-                    pinned[at] = pinned[at] or uncertain[min(unknown)]
-            at = index.get(v.goal.point, -1)
-            if at >= 0:
-                pinned[at] = pinned[at] or v.goal.pins
-            for shift in {index.get(place, -1) for place in v.goal.holds} - {-1}:
-                pinned[shift] = pinned[shift] or UNKNOWN_POINT
+                for place in (goal.point, goal.writes[0]):
+                    _hold(pinned, place, uncertain[min(unknown)])
+            _hold(pinned, goal.point, goal.pins)
+            for place in goal.holds:
+                _hold(pinned, place, UNKNOWN_POINT)
         return pinned
 
-    def _hold_for_taught(self, pinned: list[str]) -> None:
+    def _list_goals(self, by_name: bool) -> Iterator[FoundGoal]:
+        """Yield where moves go, those of blocks one by one where that may count.
+
+        Args:
+            by_name: Names of points decide what must stay.
+        """
+        many = {at + k: (block, own) for _, at, block in self.blocks
+                for k, own in enumerate(block.members) if len(own) > 1}  # fmt: skip
+        for k, v in enumerate(self.found):
+            if k not in many or not (by_name or v.goal.pins):
+                yield v.goal
+                continue
+            block, own = many[k]
+            for at, offset in zip(
+                own.tolist(), block.offset[own].tolist(), strict=True
+            ):
+                name = v.goal.name if block.names is None else block.names[at]
+                yield v.goal.behind(offset, name)
+
+    def _hold_for_taught(self, pinned: dict[int, str]) -> None:
         """Hold the points of targets that are computed and marked as taught."""
         lines = self.machine.task.taught_lines
         for v in self.found if any(lines) else ():
-            at, file = self.index.get(v.goal.point, -1), v.scope.file
-            if at < 0 or v.goal.slots[0] >= 0 or v.goal.is_rewritten_by_shift:
+            file = v.scope.file
+            if v.goal.slots[0] >= 0 or v.goal.is_rewritten_by_shift:
                 continue
             if not lines[file].isdisjoint(self.machine.texts[file].lines(v.row)):
-                pinned[at] = pinned[at] or TAUGHT_SHIFT
+                _hold(pinned, v.goal.point, TAUGHT_SHIFT)
 
     def _find_taught(self) -> list[bool]:
-        """Tell which go to taught points, or to targets shifted from one, (r,)."""
+        """Tell which go to taught points, or to targets shifted from one, (g,)."""
         taught = self.machine.task.start.taught
         if not (any(self.machine.task.taught_lines) or taught):
             return [False] * len(self.found)
@@ -474,6 +517,12 @@ class TaskCollector(Collector):
             not (own.isdisjoint(taught) and marked.isdisjoint(some))
             for own, some in zip(names, places, strict=True)
         ]
+
+
+def _hold(pinned: dict[int, str], place: int, why: str) -> None:
+    """Note why a target must stay, by its first number; what is noted first counts."""
+    if why and place >= 0:
+        pinned.setdefault(place, why)
 
 
 def _blocks(found: Sequence[FoundVisit]) -> Ints:

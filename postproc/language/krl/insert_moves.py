@@ -85,7 +85,7 @@ class KrlSplitter(TaskSplitter):
         found = set[_Row]()
         for number, file in enumerate(self.task.files):
             moves, text = file.moves.tolist(), file.text
-            for row in text.where(lambda one: isinstance(one, said.PathTrigger)):
+            for row in text.of_kind(lambda one: isinstance(one, said.PathTrigger)):
                 at = bisect(moves, row)
                 if at == len(moves) or not all(
                     isinstance(text.statement(k), said.PathTrigger | said.SplineBlock)

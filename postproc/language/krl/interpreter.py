@@ -30,7 +30,7 @@ from postproc.language.krl.modal_state import (
     KrlModes,
     ModeReader,
 )
-from postproc.language.krl.moves import KrlGoal, own_numbers
+from postproc.language.krl.moves import KrlGoal
 from postproc.language.krl.symbols import (
     AHEAD,
     ASSUMED,
@@ -88,6 +88,7 @@ class KrlMachine(TaskMachine):
     procedures = ("def",)
     reader = KrlGoal
     still = STILL | FUNCTIONS
+    ends_apart = True
     passed = (ir.Declaration,)
     acting = (
         ir.Assignment, ir.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -122,20 +123,20 @@ class KrlMachine(TaskMachine):
         """Return True for moves."""
         return isinstance(one, said.KrlMove)
 
-    def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
-        """Return X to C of a line to numbers, see `TaskMachine.places_of`."""
-        return own_numbers(one) if isinstance(one, said.KrlMove) else None
+    def planner_of(self, one: ir.SourceStatement) -> str:
+        """Return the planner of a move: they do not blend into each other."""
+        spline = isinstance(one, said.KrlMove) and one.word.startswith("s")
+        return "spline" if spline else "path"
 
-    def apart(self, context: Context) -> set[int] | None:
-        """Return the points of splines; all where an interrupt may end any move.
-
-        All of a system file, too, where numbers stay.
-        """
+    def reads_at_once(self, context: Context) -> bool:
+        """Return False where an interrupt may end any move, or in a system file."""
         file = self.task.files[context.place.scope.file]
-        if self._has_interrupts or file.is_system:
-            return None
-        blocks = file.splines
-        return {row for rows in blocks for row in rows}
+        alone = self._has_interrupts or file.is_system
+        return super().reads_at_once(context) and not alone
+
+    def list_apart(self, file: int) -> set[int]:
+        """Return the points of splines."""
+        return {row for rows in self.task.files[file].splines for row in rows}
 
     def counts_alone(self, at: At, one: ir.ForLoop) -> bool:
         """Return True if only the loop changes its variable, see `TaskMachine`.
@@ -160,7 +161,7 @@ class KrlMachine(TaskMachine):
     def _has_interrupts(self) -> bool:
         """Return True if interrupts or triggers may call routines."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for text in self.texts for one in text.said)
+        said_ones = (one for text in self.texts for one in text.said.said)
         return any(isinstance(one, kinds) for one in said_ones)
 
     # What it does.
@@ -339,7 +340,7 @@ class KrlMachine(TaskMachine):
             if self.task.files[file].is_submit:
                 continue
             here = Scope(file, self.task.files[file].name, "")
-            for row in text.where(lambda one: isinstance(one, kinds)):
+            for row in text.of_kind(lambda one: isinstance(one, kinds)):
                 one, around = text.statement(row), self.task.routine_around(file, row)
                 word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
                 number = self._number_of(here.at(row), one.number)

@@ -90,7 +90,7 @@ LANGUAGE = Krl
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
     """Refuse a program that switches the controller's own accuracy model on."""
     for file in files:
-        for row in file.text.where(lambda one: bool(_switches_on(one))):
+        for row in file.text.of_kind(lambda one: bool(_switches_on(one))):
             name = _switches_on(file.text.statement(row))
             problem = f"sets {name.upper()}: the controller "
             problem += "compensates on its own, this would do it twice"

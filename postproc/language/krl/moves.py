@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from postproc.arrays import Bools, Floats, all_in_rows
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis import goals
@@ -20,7 +21,8 @@ from postproc.language.analysis.found_goals import (
     hold_numbers,
     not_reached,
 )
-from postproc.language.analysis.symbols import whole
+from postproc.language.analysis.move_blocks import TargetSlots
+from postproc.language.analysis.symbols import LARGEST, whole
 from postproc.language.analysis.values import KnownRecord, Value, WrittenNumber
 from postproc.language.krl import pose_encoding, symbols
 from postproc.language.krl import syntax as said
@@ -49,6 +51,7 @@ SPLINE = Reason(
     Code.ENDS_ELSEWHERE,
     "a point of a spline of joint moves: how the arm goes there is not known",
 )
+_SOUND_STATUS = pose_encoding.MEASURED  # values of S from here on may be odd
 _ALONE = ("ptp", "lin", "circ", "sptp", "slin", "scirc")
 # Words of moves that are known in no spline block, in one of paths, in one of joints.
 _POINTS = {
@@ -141,24 +144,6 @@ def motion_of(word: str) -> Motion:
     return Motion.JOINT if stem.startswith("ptp") else Motion.LINEAR
 
 
-def own_numbers(move: said.KrlMove) -> list[int] | None:
-    """Return which numbers of a line to a written point are its X, Y, Z, A, B, C.
-
-    None for moves of another kind, and for those that are more than numbers.
-    """
-    to = move.to
-    alone = move.via is None and move.angle is None and not move.settings
-    if move.word not in ("lin", "slin") or not alone:
-        return None
-    if not isinstance(to, said.KrlAggregate):
-        return None
-    slots = {one.name: one.value.slot for one in to.fields
-             if isinstance(one.value, ir.Num)}  # fmt: skip
-    if len(slots) != len(to.fields) or not slots.keys() >= {*PLACE}:
-        return None
-    return [slots[name] for name in PLACE]
-
-
 @dataclass(frozen=True)
 class KrlGoal(goals.GoalReader):
     """Reads where moves lead."""
@@ -169,6 +154,7 @@ class KrlGoal(goals.GoalReader):
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
     outlives = "stands in a data list: it outlives the run"
+    told_apart = (6, 7)  # S and T
 
     # Moves.
 
@@ -238,6 +224,32 @@ class KrlGoal(goals.GoalReader):
         return move, shared
 
     # Points.
+
+    def goal_of(
+        self,
+        target: TargetSlots,
+        numbers: Sequence[float | None],
+        outside: Sequence[float | None],
+    ) -> FoundGoal:
+        """Return where numbers lead, see `GoalReader.goal_of`."""
+        place = [math.nan if x is None else x for x in numbers[:6]]
+        aux = self._count_outside([math.nan if x is None else x for x in outside])
+        if target.joints:
+            return FoundGoal(Meaning.JOINTS, (*place, 0.0, 0.0), aux=aux)
+        s, t = (pose_encoding.NOT_WRITTEN if x is None else x for x in numbers[6:])
+        why = self._status(s, t)
+        return FoundGoal(Meaning.POSE, (*place, s, t), aux=aux, why=why)
+
+    @staticmethod
+    def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+        """Tell which targets are angles, or a place with S and T that say something."""
+        found = all_in_rows(np.isfinite(numbers[:, np.array(target.slots) >= 0]))
+        for column, slot in enumerate(target.slots[6:], start=6):
+            flags = np.where(found, numbers[:, column], -1.0)
+            if slot >= 0:
+                found &= (flags >= 0.0) & (flags == np.floor(flags))
+                found &= flags < (_SOUND_STATUS if column == 6 else LARGEST)
+        return found
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read home positions, where the arm is, and products of frames."""
@@ -334,8 +346,11 @@ class KrlGoal(goals.GoalReader):
         return ACCURATE if s > 0 and int(s) & pose_encoding.MEASURED else NO_REASON
 
     def _outside(self, found: KnownRecord) -> tuple[float, ...]:
-        """Return the external axes that count: declared by the cell, or not 0."""
-        values = [found.number(name) for name in symbols.OUTSIDE]
+        """Return the external axes that count, see `_count_outside`."""
+        return self._count_outside([found.number(name) for name in symbols.OUTSIDE])
+
+    def _count_outside(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Return external axes: those that the cell declares, or that are not 0."""
         return tuple(
             value if value != 0.0 or axis in self.task.start.aux else math.nan
             for axis, value in enumerate(values, start=1)

@@ -66,6 +66,8 @@ def read_krl(source: Source) -> KrlFile:
     outline, splines, begin = Outline(text, _WORDS), list[range](), -1
     moves = text.of_kind(lambda one: isinstance(one, said.KrlMove))
     for row in text.of_kind(lambda one: not isinstance(one, said.KrlMove)):
+        if outline.declare(row, name):
+            continue
         match one := text.statement(row):
             case said.SplineBlock(word=word):
                 outline.take(row, one, name)

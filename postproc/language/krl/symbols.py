@@ -16,6 +16,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import Datum
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
@@ -218,14 +219,13 @@ class KrlTask(TaskSymbols[KrlFile]):
         for name in (self.odd_words | self.called_beside) & arrays:
             found[name].add(ANY)
         for number, file in enumerate(self.files):
-            for row in file.text.where(
-                lambda one: any(data.name in arrays for data in self.list_changes(one))
-            ):
-                routine = self.routine_around(number, row)
-                here = self.scope_of(routine) if routine else Scope(number, "", "")
+            there = Scope(number, "", "")
+            for row in file.text.of_kind(lambda one: bool(self.list_changes(one))):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in arrays and not given:
+                        routine = self.routine_around(number, row)
+                        here = self.scope_of(routine) if routine else there
                         found[target.name].add(self._index_of(target, here.at(row)))
         return found
 
@@ -311,6 +311,26 @@ class KrlTask(TaskSymbols[KrlFile]):
                 own = (x for x in one.children() if isinstance(x, ir.Operand))
                 return ir.walk(*own, *(setting.value for setting in settings))
         return ir.walk(one)
+
+    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
+        """Return where a plain move goes, see `TaskSymbols.plain_end`."""
+        if not isinstance(one, said.KrlMove) or one.settings:
+            return None
+        plain = one.word in ("ptp", "lin", "sptp", "slin") and one.via is None
+        return one.to if plain and one.angle is None else None
+
+    def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
+        """Return the numbers of an aggregate, see `TaskSymbols.read_slots`."""
+        fields = operand.fields if isinstance(operand, said.KrlAggregate) else ()
+        slots = {f.name: f.value.slot for f in fields if isinstance(f.value, ir.Num)}
+        outside = tuple(slots.get(name, -1) for name in OUTSIDE)
+        for names, needed in ((COMPONENTS, COMPONENTS[:6]), (AXES, AXES)):
+            own = slots.keys() <= {*names, *OUTSIDE}
+            if own and slots.keys() >= {*needed} and len(slots) == len(fields):
+                found = [slots.get(name, -1) for name in names]
+                found += [-1] * (len(COMPONENTS) - len(found))
+                return TargetSlots(tuple(found), outside, joints=names is AXES)
+        return None
 
     def note_in(self, uses: NamesUsed, file: KrlFile, one: ir.SourceStatement) -> None:
         """Note a statement; what a data list assigns is the first value of data."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Mapping, Sequence
+from typing import Any
 
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language.analysis import to_visits
 from postproc.language.analysis.conditions import NO_LOAD, Conditions, Zone, cell_pose
-from postproc.language.analysis.found_goals import FoundGoal, not_reached
+from postproc.language.analysis.found_goals import FoundGoal, FoundVisit, not_reached
 from postproc.language.analysis.to_visits import Arrival, zone_at
 from postproc.language.krl import modal_state
 from postproc.language.krl.interpreter import KrlMachine
@@ -54,13 +55,14 @@ class KrlCollector(to_visits.TaskCollector):
 
     def __init__(self, machine: KrlMachine) -> None:
         """Find what ways to other arrivals tell of each."""
-        found: Sequence[KrlVisit] = machine.visits
+        runs: Sequence[FoundVisit] = machine.visits
+        found: list[Any] = [v for run in runs for v in run.arrivals]
         _keep_orientation(machine, found)
-        _follow_partial(machine, found)
+        _follow_partial(machine, runs, found)
         super().__init__(machine)
         self.krl, self.base = machine, cell_pose(machine.task.start.base)
-        self.ends, self.odd = _ends(found, machine.lost), _odd_status(found)
-        self.number = {id(v): k for k, v in enumerate(found)}
+        self.ends, self.odd = _ends(runs, machine.lost), _odd_status(found)
+        self.number = {id(v): k for k, run in enumerate(runs) for v in run.arrivals}
 
     def arrive(self, v: KrlVisit) -> Arrival:
         """Say what an arrival is carried out with."""
@@ -79,7 +81,7 @@ class KrlCollector(to_visits.TaskCollector):
             remote = modes.tool.remote or modes.base.remote
             swapped = remote and modes.interpolation != "#tcp"
             given += (_SWAPPED if swapped else NO_REASON,)
-        given += (_STATUS if at in self.odd else NO_REASON,)
+        given += (_STATUS if id(v) in self.odd else NO_REASON,)
         lost = modes.load == modal_state.LOST_LOAD
         given += (modal_state.UNKNOWN_LOAD if lost else NO_REASON,)
         conditions = Conditions(
@@ -159,20 +161,22 @@ def _zone(v: KrlVisit, modes: modal_state.KrlModes, stops: bool | None) -> Zone:
 # What stands behind a point decides whether it is passed.
 
 
-def _ends(found: Sequence[KrlVisit], lost: Container[int]) -> list[bool | None]:
+def _ends(runs: Sequence[FoundVisit], lost: Container[int]) -> list[bool | None]:
     """Tell of every visit whether the arm stops there, None where that is not sure.
 
     The old planner and that of splines do not blend into each other, statements that
     wait for what runs ahead stop the arm, and so does the end of the program.
 
     Args:
-        found: The visits.
+        runs: The visits; one planner makes all of a block, which ends by itself.
         lost: Those behind which the arm may go anywhere.
     """
-    stops = [set[bool | None]([None] if k in lost else ()) for k in range(len(found))]
-    for after in found:
-        for origin in (k for k in after.origins if k >= 0):
-            before, stop = found[origin], after.modes.halted
+    stops = [set[bool | None]([None] if k in lost else ()) for k in range(len(runs))]
+    for run in runs:
+        after: Any = run.arrivals[0]
+        for origin in (k for k in run.origins if k >= 0):
+            before: Any = runs[origin].arrivals[0]
+            stop: bool | None = run.modes.halted
             if after.by_spline_planner != before.by_spline_planner:
                 stop = True
             elif after.modes.ahead != before.modes.ahead and not stop:
@@ -191,7 +195,9 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
             v.goal = not_reached(v.goal, why)
 
 
-def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
+def _follow_partial(
+    machine: KrlMachine, runs: Sequence[FoundVisit], found: Sequence[KrlVisit]
+) -> None:
     """Forget where missing numbers lead that are not sure to be those before.
 
     They are not where X, Y, Z were commanded in other frames, or behind an arc that
@@ -199,7 +205,8 @@ def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
     """
     partial = (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
     for v in (v for v in found if v.goal.target in partial):
-        before = [found[k] for k in machine.list_visits(v.origins)]
+        origins = machine.list_visits(v.origins)
+        before: list[Any] = [runs[k].arrivals[0] for k in origins]
         lost = any(one.move.angle is not None for one in before)
         if v.goal.target == Meaning.PARTIAL_POSE:
             own = _frames(machine, v)
@@ -217,15 +224,16 @@ def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:
 
 
 def _odd_status(found: Sequence[KrlVisit]) -> set[int]:
-    """Find joint moves whose S says another side of axis 5 than T does.
+    """Find joint moves, by identity, whose S says another side of axis 5 than T does.
 
     What bit 2 of S means is told by most of the program's own points; where they do
     not agree at all, all are odd.
     """
-    agree: Mapping[bool, set[int]] = {True: set(), False: set()}
-    for k, v in enumerate(found):
+    agree: Mapping[bool, dict[int, int]] = {True: {}, False: {}}
+    for v in found:
         if v.motion == Motion.JOINT and v.goal.target == Meaning.POSE:
             s, t = v.goal.values[6:]
-            agree[bool(int(s) & 4) == bool(int(t) & 16)].add(k)
-    more, less = sorted(agree.values(), key=len, reverse=True)
-    return more | less if len(more) == len(less) else less
+            agree[bool(int(s) & 4) == bool(int(t) & 16)][id(v)] = v.count
+    more, less = sorted(agree.values(), key=lambda one: sum(one.values()), reverse=True)
+    alike = sum(more.values()) == sum(less.values())
+    return {*more, *less} if alike else {*less}

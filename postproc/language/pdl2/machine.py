@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from postproc.arrays import Ints
 from postproc.diagnostics import NO_REASON, Code, Reason
 from postproc.language import ir
 from postproc.language.analysis.call_context import At, Context
@@ -19,7 +17,6 @@ from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body
 from postproc.language.pdl2.side_effects import list_invoked
 from postproc.language.pdl2.values import Nothing
-from postproc.robot.trajectory import Motion
 
 MOST_AXES = 12  # auxiliary axes at the most
 UNKNOWN = (math.nan,) * 6
@@ -68,63 +65,6 @@ class Pdl2Visit(FoundVisit):
         return self.at
 
 
-@dataclass(frozen=True, slots=True)
-class MoveForm:
-    """What moves have in common that differ in numbers and points only.
-
-    Attributes:
-        motion: Trajectory.
-        reason: Why that is not known, or why none can be compensated.
-        fly: MOVEFLY.
-        slots: Number slots of the six numbers that stand in the move, () where it goes
-            to something else.
-        joints: Those are joint angles.
-        config: The configuration string beside them, None where there is none.
-        overrides: Settings that WITH sets to numbers, and the slots of these.
-    """
-
-    motion: Motion
-    reason: Reason = NO_REASON
-    fly: bool = False
-    slots: tuple[int, ...] = ()
-    joints: bool = False
-    config: str | None = None
-    overrides: tuple[tuple[str, int], ...] = ()
-
-
-WRITTEN, HELD = -1, -2  # instead of a row of the variable file
-
-
-@dataclass
-class MoveBlock(Pdl2Visit):
-    """Moves that follow each other, each from the one before.
-
-    Attributes:
-        at_once: Their rows, (k,).
-        form: Which form each has, (k,).
-        forms: The forms, by number.
-        point: Row of the variable file that each goes to, (k,); WRITTEN where the
-            numbers stand in the move, HELD where its goal was evaluated.
-        goals: These, by the index of the move.
-    """
-
-    at_once: Ints = field(kw_only=True)
-    form: Ints = field(kw_only=True)
-    forms: Mapping[int, MoveForm] = field(kw_only=True)
-    point: Ints = field(kw_only=True)
-    goals: Mapping[int, Pdl2Goal] = field(kw_only=True)
-
-    @property
-    def rows(self) -> Ints:
-        """The rows of all moves that it stands for."""
-        return self.at_once
-
-    @property
-    def is_run(self) -> bool:
-        """Whether more than its first move is to be filled."""
-        return True
-
-
 Key = tuple[Context, int, int]
 
 
@@ -150,7 +90,7 @@ class Machine(Interpreter[Store]):
     _called: dict[int, tuple[ir.FunctionCall, ...]] = field(default_factory=dict)
     _numbers: dict[Key, int] = field(default_factory=dict)
 
-    def record(self, here: Execution, sub: int, visit: Pdl2Visit) -> int:
+    def record(self, here: Execution, sub: int, visit: FoundVisit) -> int:
         """Keep visits, and return their number; the last analysis of a place holds."""
         key = (here.context, here.place.offset + here.row, sub)
         number = self._numbers.setdefault(key, len(self.visits))

@@ -1,181 +1,191 @@
-"""Blocks of moves to known places, run a thousand at a time."""
+"""Blocks of moves of PDL2 to known places, with calls between them that do nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints
+from postproc.arrays import Bools, Floats, Ints, all_in_rows
 from postproc.language import ir
+from postproc.language.analysis.found_goals import FoundVisit
+from postproc.language.analysis.move_blocks import (
+    MoveBlock,
+    PlainMove,
+    PlainMoves,
+    Runs,
+    TargetSlots,
+    choose_examples,
+    find_plain,
+    find_runs,
+    number_rows,
+    split_by,
+)
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
+from postproc.language.pdl2.entries import Entries
 from postproc.language.pdl2.evaluate import Execution
 from postproc.language.pdl2.external_routines import stays_still
 from postproc.language.pdl2.job import Place, World
-from postproc.language.pdl2.machine import (
-    HELD,
-    WRITTEN,
-    Machine,
-    MoveBlock,
-    MoveForm,
-    Pdl2Goal,
-)
-from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
-from postproc.language.pdl2.program import ProgramLines
+from postproc.language.pdl2.machine import MOST_AXES, Machine
+from postproc.language.pdl2.moves import read_move
 from postproc.language.pdl2.side_effects import CHANGING, PURE, list_invoked
-from postproc.language.pdl2.values import Nothing
+from postproc.language.text.statement_table import Statements
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.text.templates import alike, name_index, number_in_order
-from postproc.language.visits import Meaning
-from postproc.robot.trajectory import Motion
+from postproc.language.text.templates import number_in_order
 
 # Lines that are run a thousand at a time: moves to known places, idle calls.
 #
 # Such a line changes the store, if at all, in the same way however often it is run, and
 # reads nothing that another one changes: running one line of every variant runs them
-# all. Whether a line is quiet is told by the text alone, so that a stretch of them is
-# the same stretch each time that the analysis comes to it.
+# all. Which lines are plain is told by the text alone, so that a block of them is the
+# same block each time that the analysis comes to it.
 
 _POINTS = ("position", "xtndpos", "jointpos")
 _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
+_WRITTEN, _ALONE = -1, -2  # instead of a row of the variable file
 
 
-class PlainMoves:
-    """The quiet lines of a body.
+def _read_line(one: ir.SourceStatement) -> PlainMove | None:
+    """Read a line whose numbered names are open: a plain move, or a call.
+
+    None for all others. WITH may set numbers.
+    """
+    if isinstance(one, ir.Instruction):
+        idle = PlainMove("", counting=())
+        return None if isinstance(one, ast.ProgramCall) else idle
+    if not isinstance(one, ast.Move) or one.how != "TO":
+        return None
+    other = one.arm or one.via or one.til is not None or one.sync
+    if other or one.trajectory not in ("JOINT", "LINEAR", ""):
+        return None
+    where, found = one.where[0], [_slot_of(setting) for setting in one.settings]
+    slots = tuple(slot for slot in found if slot is not None)
+    system = isinstance(where, ir.DataObject) and where.name.startswith("$")
+    if system or len(slots) < len(found):
+        return None
+    return PlainMove.to(where, _slots_of, counting=slots)
+
+
+def _slot_of(setting: ir.Assignment) -> int | None:
+    """Return the number that WITH sets, None where it sets anything else."""
+    name, value = setting.target.name, setting.value
+    plain = not setting.target.steps and name.startswith("$") and name not in _NOT_WITH
+    return value.slot if plain and isinstance(value, ir.Num) else None
+
+
+def _slots_of(operand: ir.Operand | None) -> TargetSlots | None:
+    """Return the six numbers of a written target, None for all other operands."""
+    items: Sequence[ir.Operand | None] = ()
+    match operand:
+        case ir.Composite(items):
+            pass
+        case ir.FunctionCall("pos") as call:
+            last = isinstance(call.values[-1], ir.StringLiteral) if call.values else 0
+            items = call.values[:-1] if last else call.values
+    slots = tuple(item.slot for item in items if isinstance(item, ir.Num))
+    return TargetSlots(slots) if len(slots) == len(items) == 6 else None
+
+
+def _are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+    return all_in_rows(np.isfinite(numbers))
+
+
+class BodyLines:
+    """The plain lines of a body.
 
     Attributes:
-        first: Row of the first line that `variant` tells of.
-        variant: Index into `statements` of every row, (n,), -1 where it is not quiet.
+        plain: Those of its program that may be.
+        first: Its first row.
+        variant: Index into the moves of the program of each of its rows, (n,), -1 where
+            it is not plain.
         statements: What the lines of each variant say, but for numbers and points.
-        forms: What moves of each variant have in common, see `_form`; None for calls.
         calls: Which of them call something.
-        points: Where the point is stored that lines of a shape go to, unless `name`
-            tells it; of an array's elements the beginning, and slots of the index.
+        runs: The blocks.
+        goal: Index into `names` of where each row goes, (n,), -1 where it is written.
+        names: Names of variables, in lower case, that lines go to.
+        own: Which of them are variables of the program itself, and no arrays, (m,).
+        rows: Rows of those in the variable file, -1 where it tells none.
         prefix: What keys of the program's own variables begin with.
-        names: Names, in lower case, of the program's own variables that lines go to.
-        rows: Their rows in the variable file, -1 where it tells none.
-        name: Index into `names` for every row, (n,), -1 for none.
-        ends: Rows at which stretches end, ascending.
     """
 
-    def __init__(
-        self, world: World, place: Place, volatile: frozenset[str], may_be: Bools
-    ) -> None:
+    def __init__(self, world: World, place: Place, plain: PlainMoves) -> None:
         """Find them.
 
         Args:
             world: The files of the job.
             place: The body.
-            volatile: Names that condition handlers change.
-            may_be: Which shapes of the program may be those of quiet lines, (k,).
+            plain: The lines of its program that may be.
         """
-        self._world, self._place, self._volatile = world, place, volatile
-        program, body = place.program, place.body
+        self._world, self._place, self.plain = world, place, plain
+        body = place.body
         self._parameters = {p.name for p in body.parameters}
-        self.statements: list[ir.SourceStatement] = []
-        self.points: dict[int, tuple[str, tuple[int, ...]]] = {}
-        self.prefix, self.names = f"{program.name}/", NameColumn()
-        self.first = first = body.first + 1
-        shape = program.lines.shape[first : body.last]
-        self._shapes, own = np.unique(shape, return_inverse=True)
-        self._name = np.full(len(self._shapes), -1, dtype=np.int64)
-        of_shape, shapes = self._name.copy(), self._shapes[may_be[self._shapes]]
-        forms = program.lines.said.form[shapes]
-        kinds, begins = np.unique(np.sort(forms), return_index=True)
-        groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
-        for form, mine in zip(kinds.tolist(), groups, strict=False):
-            of_shape[np.searchsorted(self._shapes, mine)] = self._add(form, mine)
-        self.variant: Ints = of_shape[own]
-        joins = np.array(sorted(body.flow.joins), dtype=np.int64)
-        loud = first + np.flatnonzero(self.variant < 0)
-        self.ends: Ints = np.unique(np.concatenate([loud, joins, [body.last]]))
-        said = self.statements
-        self.forms = [*map(_form, said)]
-        self.calls = [any(_calls(world, place, one)) for one in said]
+        self.first, self.prefix = body.first + 1, f"{place.program.name}/"
+        variant = plain.variant[self.first : body.last].astype(np.int64)
+        number, example = number_in_order(variant)
+        self.statements, self.calls = dict[int, ir.SourceStatement](), set[int]()
+        quiet = np.ones(len(example), dtype=bool)
+        for k, at in enumerate(example.tolist()):
+            if (own := int(variant[at])) < 0:
+                continue
+            one = place.program.lines.statement(self.first + at)
+            called = _calls(world, place, one)
+            quiet[k] = all(map(self._does_nothing, called))
+            self.statements[own] = one
+            self.calls |= {own} if called else set()
+        variant[~quiet[number]] = -1
+        self._find_names(plain, variant)
+        self.variant = variant
+        joins = body.flow.joins
+        self.runs: Runs = find_runs(self.first, joins, plain, variant)
         self.rows = world.initial.rows(self.prefix, self.names)
-        self.name: Ints = self._name[own]
+        self.rows[~self.own] = -1
 
-    def end(self, row: int) -> int:
-        """Return the row after the stretch of a move, the row itself if none."""
-        at = self.variant[row - self.first] if self.first <= row else -1
-        if at < 0 or not isinstance(self.statements[at], ast.Move):
-            return row
-        return int(self.ends[np.searchsorted(self.ends, row, side="right")])
+    def _find_names(self, plain: PlainMoves, variant: Ints) -> None:
+        """Find the variables that lines go to; leave those to anything but a point."""
+        shapes = self._place.program.lines.shapes
+        at = np.flatnonzero(plain.named[variant])
+        open_name = plain.name[self.first + at].astype(np.int64)
+        # A name of its own, or the one that all of its variant go to.
+        code = np.where(open_name >= 0, open_name, -1 - variant[at])
+        used, which = np.unique(
+            2 * code + plain.indexed[variant[at]], return_inverse=True
+        )
+        code, array = used // 2, (used % 2).astype(bool)
+        literal = [plain.moves[-1 - k].name for k in code[code < 0].tolist()]
+        self.names = NameColumn(literal)
+        self.names.extend(shapes.names.take(code[code >= 0]).lower())
+        points, self.own = self._find_points(array)
+        self.goal = np.full(len(variant), -1, dtype=np.int64)
+        self.goal[at] = which
+        variant[at[~points[which]]] = -1
 
-    def _add(self, form: int, shapes: Ints) -> Ints:
-        """Return the variants of shapes of one form, -1 where one is not quiet."""
-        said = self._place.program.lines.said
-        one = said.said[form]
-        where = one.where[0] if isinstance(one, ast.Move) else None
-        names = said.shapes.names_at(shapes)
-        if not isinstance(where, ir.DataObject):
-            return self._variants(shapes, names)
-        index, at = _number_slots(where.steps), name_index(where.name)
-        variants = np.full(len(shapes), -1)
-        if index is None:
-            return variants
-        goal, which = NameColumn([where.name]), np.zeros(len(shapes), dtype=np.int64)
-        if at >= 0:
-            used, which = np.unique(names[:, at], return_inverse=True)
-            goal = said.shapes.names.take(used.astype(np.int64)).lower()
-            names = np.delete(names, at, axis=1)
-        quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
-        variants[quiet] = self._variants(shapes[quiet], names[quiet])
-        return variants
-
-    def _points(
-        self,
-        shapes: Ints,
-        goal: NameColumn,
-        which: Ints,
-        index: tuple[int, ...],
-        array: bool,
-    ) -> Bools:
-        """Enter where shapes go, and tell which of them go to a point, (m,).
+    def _find_points(self, array: Bools) -> tuple[Bools, Bools]:
+        """Tell which names are those of points, and which are the program's own, (m,).
 
         Args:
-            shapes: Shapes of one form, (m,).
-            goal: Names that they go to.
-            which: The one of each, (m,).
-            index: Number slots of an element's index.
-            array: Whether there is any.
+            array: Which are followed by an index, (m,).
         """
-        place = self._place
+        place, names = self._place, self.names
         declared = place.program.variables
-        points = declared.passing(goal, lambda said: _is_point(said.type, array))
-        alone = ~declared.passing(goal, lambda said: bool(said.exported))
-        alone &= not array and not any(mark in self.prefix for mark in "[.")
-        hidden = NameColumn(sorted(place.body.own_names | self._volatile)).find(goal)
-        for k in np.flatnonzero(hidden >= 0).tolist():
-            points[k], alone[k] = self._is_point(goal[k], array), False
-        own = np.flatnonzero((points & alone)[which])
-        at = np.searchsorted(self._shapes, shapes[own])
-        self._name[at] = len(self.names) + which[own]
-        self.names.extend(goal)
-        for k in np.flatnonzero((points & ~alone)[which]).tolist():
-            key = self._world.root(place, goal[which[k]])
-            self.points[int(shapes[k])] = key, index
-        found: Bools = points[which]
-        return found
-
-    def _variants(self, shapes: Ints, names: Ints) -> Ints:
-        """Return the variants of shapes of one form with some names, (m,)."""
-        ends = names.shape[1] * np.arange(1, len(shapes) + 1)
-        kind = alike(names.ravel(), ends - names.shape[1], ends)
-        found = []
-        for k in number_in_order(kind)[1].tolist():
-            one = self._place.program.lines.said[int(shapes[k])]
-            quiet = all(map(self._does_nothing, _calls(self._world, self._place, one)))
-            found.append(len(self.statements) if quiet else -1)
-            self.statements += [one] if quiet else []
-        return np.array(found, dtype=np.int64)[kind]
+        points = np.where(
+            array,
+            declared.passing(names, lambda said: _is_point(said.type, True)),
+            declared.passing(names, lambda said: _is_point(said.type, False)),
+        )
+        own = ~declared.passing(names, lambda said: bool(said.exported))
+        own &= ~array & (not any(mark in self.prefix for mark in "[."))
+        hiding = NameColumn(sorted(place.body.own_names | self._world.volatile))
+        for k in np.flatnonzero(hiding.find(names) >= 0).tolist():
+            points[k], own[k] = self._is_point(names[k], bool(array[k])), False
+        return points, own & points
 
     def _is_point(self, name: str, array: bool) -> bool:
         """Tell whether a name is a variable whose value no call changes unseen."""
-        if name in self._parameters or name in self._volatile:
+        if name in self._parameters or name in self._world.volatile:
             return False
         return _is_point(self._world.type_of(self._place, name), array)
 
@@ -204,62 +214,11 @@ class PlainMoves:
         return False
 
 
-def _may_be_plain(said: ir.SourceStatement) -> bool:
-    if isinstance(said, ir.Instruction):
-        return not isinstance(said, ast.ProgramCall)
-    return _form(said) is not None
-
-
-def _form(move: ir.SourceStatement) -> MoveForm | None:
-    """Return what moves alike have in common, but for their trajectory.
-
-    None unless they go to numbers or a variable. WITH may set numbers.
-    """
-    if not isinstance(move, ast.Move) or move.how != "TO":
-        return None
-    other = move.arm or move.via or move.til is not None or move.sync
-    if other or move.trajectory not in ("JOINT", "LINEAR", ""):
-        return None
-    overrides = []
-    for one in move.settings:
-        name, plain = one.target.name, not one.target.steps
-        plain = plain and name.startswith("$") and name not in _NOT_WITH
-        if not (plain and isinstance(one.value, ir.Num)):
-            return None
-        overrides.append((name.lstrip("$"), one.value.slot))
-    form = MoveForm(Motion.JOINT, fly=move.fly, overrides=tuple(overrides))
-    items: Sequence[ir.Operand | None] = ()
-    config = joints = None
-    match move.where[0]:
-        case ir.DataObject(name, () | (ir.ElementStep(_),)):
-            return None if name.startswith("$") else form
-        case ir.Composite(items):
-            joints = True
-        case ir.FunctionCall("pos") as call:
-            *items, config = (*call.values, None)
-            if items and isinstance(items[-1], ir.StringLiteral):
-                *items, config = items
-    slots = tuple(item.slot for item in items if isinstance(item, ir.Num))
-    if not len(slots) == len(items) == 6:
-        return None
-    written = config.text if isinstance(config, ir.StringLiteral) else None
-    return replace(form, slots=slots, joints=bool(joints), config=written)
-
-
 def _is_point(type_: ast.Type | None, array: bool) -> bool:
     """Tell whether a type is that of a point, or of an array of them."""
     if type_ is None or type_.name not in _POINTS or type_.path:
         return False
     return type_.array == array
-
-
-def _number_slots(steps: tuple[str | ir.ElementStep, ...]) -> tuple[int, ...] | None:
-    """Return the slots of an index that is written in numbers, None for any other."""
-    index = [
-        i for step in steps if isinstance(step, ir.ElementStep) for i in step.subscripts
-    ]
-    slots = tuple(i.slot for i in index if isinstance(i, ir.Num))
-    return slots if len(slots) == len(index) else None
 
 
 def _calls(
@@ -272,24 +231,18 @@ def _calls(
     return found
 
 
-# Run a stretch of quiet lines at once.
-
-LEAST = 2  # lines that are worth it
-_NO_INDEX = Nothing("its index is known only at run time")
-_OF_EACH = Pdl2Goal(Meaning.UNKNOWN)  # each move of a block has its own
-
-
 @dataclass
 class MoveBlocks:
-    """The stretches of quiet lines of a job, found when a body is first come to."""
+    """The blocks of a job, found when a body is first come to."""
 
     machine: Machine
-    quiet: dict[int, PlainMoves] = field(default_factory=dict)
-    _may_be: dict[int, Bools] = field(default_factory=dict)
+    _plain: dict[int, PlainMoves] = field(default_factory=dict)
+    _lines: dict[int, BodyLines] = field(default_factory=dict)
+    _kinds: Ints | None = None
     _written: dict[tuple[int, int], MoveBlock] = field(default_factory=dict)
 
     def run(self, here: Execution) -> bool:
-        """Run the stretch that begins at a row; tell whether there is one.
+        """Run the block that begins at a row; tell whether there is one.
 
         Where a condition handler may move the arm at any time there is none: every
         move may then come from elsewhere. Nor is there where the moves may be another
@@ -297,123 +250,147 @@ class MoveBlocks:
         """
         if self.machine.interrupted or here.other_default():
             return False
-        quiet = self._quiet(here)
-        end = quiet.end(here.row)
-        if end - here.row < LEAST:
+        lines = self._lines_of(here.world, here.place)
+        end, first = lines.runs.get(here.row), (id(here.place.body), here.row)
+        if end is None:
             return False
-        first = (id(here.place.body), here.row)
-        run = self._written.get(first)
-        if run is None or run.modes is not here.store.settings:
-            rows = np.arange(here.row, end)
-            variant = quiet.variant[rows - quiet.first]
-            run = self._run_all(here, quiet, rows, variant)
-            calls = np.array(quiet.calls)[variant].any()
-            if not calls and (run.point == WRITTEN).all():
-                self._written[first] = run
+        block = self._written.get(first)
+        if block is None or block.modes is not here.store.settings:
+            block = self._read(here, lines, end)
         # Moves to written numbers are the same ones again under the same settings:
         # what differs is where the arm comes from.
-        here.row, come = run.at, self.machine.predecessors(here)
-        arrived = self.machine.record(here, 0, replace(run, origins=come))
+        come = self.machine.predecessors(here)
+        arrived = self.machine.record(here, 0, replace(block, origins=come))
         here.store.last, here.row = frozenset({arrived}), end
         return True
 
-    def _run_all(
-        self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-    ) -> MoveBlock:
-        """Run the lines of a stretch; return its moves."""
-        forms = self._run_one_of_each(here, quiet, rows, variant)
-        moves = np.isin(variant, np.array([*forms], dtype=np.int64))
-        rows, variant = rows[moves], variant[moves]
-        here.row = int(rows[0])
-        point, goals = np.full(len(rows), WRITTEN), dict[int, Pdl2Goal]()
-        if not all(form.slots for form in forms.values()):
-            point, goals = _points(here, quiet, rows, variant)
-        return MoveBlock(
-            here.place, Motion.JOINT, False, _OF_EACH, here.store.settings,
-            count=len(rows), at=here.row, at_once=rows, form=variant, forms=forms,
-            point=point, goals=goals,
-        )  # fmt: skip
+    def _lines_of(self, world: World, place: Place) -> BodyLines:
+        program, body = place.program, place.body
+        if id(program) not in self._plain:
+            found = find_plain(program.lines, _read_line, _are_sound)
+            self._plain[id(program)] = found
+        if id(body) not in self._lines:
+            self._lines[id(body)] = BodyLines(world, place, self._plain[id(program)])
+        return self._lines[id(body)]
 
-    def _quiet(self, here: Execution) -> PlainMoves:
-        program, body = here.place.program, here.place.body
-        if id(program) not in self._may_be:
-            self._may_be[id(program)] = program.lines.said.which(_may_be_plain)
-        if id(body) not in self.quiet:
-            self.quiet[id(body)] = PlainMoves(
-                here.world, here.place, here.world.volatile, self._may_be[id(program)]
-            )
-        return self.quiet[id(body)]
+    def _read(self, here: Execution, lines: BodyLines, end: int) -> MoveBlock:
+        """Run the lines of a block; return its moves."""
+        place, begin = here.place, here.row
+        rows, plain = np.arange(begin, end), self._plain[id(place.program)]
+        variant = lines.variant[rows - lines.first]
+        self._run_one_of_each(here, lines, rows, variant)
+        going = plain.going[variant]
+        rows, variant = rows[going], variant[going]
+        points = _find_rows(here, lines, rows)
+        text, entries = place.program.lines, here.world.initial.entries
+        at = np.maximum(points, 0)
+        origin = text.first[rows].astype(np.int64)
+        columns, named = [variant], points >= 0
+        if named.any():
+            origin = np.where(named, entries.slots[at, 0], origin)
+            columns.append(np.where(named, self._kinds_of(here.world)[at], -1))
+        if marked := here.world.taught_lines[text.source.name]:
+            columns.append(np.isin(text.begin_line[rows], sorted(marked)).astype(int))
+
+        def read(k: int) -> FoundVisit:
+            here.row = int(rows[k])
+            one = text.statement(here.row)
+            assert isinstance(one, ast.Move)
+            return read_move(here, one)
+
+        def slots_at(k: int) -> tuple[int, ...]:
+            base, target = here.world.initial.base, plain.moves[variant[k]].target
+            if target is None:
+                return tuple((base + entries.slots[points[k]]).tolist())
+            return tuple(place.first + int(origin[k]) + slot for slot in target.slots)
+
+        chosen = choose_examples(columns, points == _ALONE, read, slots_at)
+        here.row, more = begin, dict[str, Any]()
+        if named.any():
+            more["names"], more["values"] = entries.name.take(at), entries.numbers[at]
+            more["aux"] = _read_aux(entries, points)
+        return MoveBlock.of(chosen, rows, origin, modes=here.store.settings, **more)
 
     def _run_one_of_each(
-        self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-    ) -> dict[int, MoveForm]:
-        """Let the first line of every variant have its effects.
-
-        Returns:
-            The forms of the moves, with their trajectories, by variant.
-        """
-        found, first = np.unique(variant, return_index=True)
-        forms = {}
-        for at in np.argsort(first).tolist():
-            here.row = int(rows[first[at]])
-            number = int(found[at])
-            statement, form = quiet.statements[number], quiet.forms[number]
-            if quiet.calls[number]:
+        self, here: Execution, lines: BodyLines, rows: Ints, variant: Ints
+    ) -> None:
+        """Let the first line of every variant have its effects."""
+        for k in number_in_order(variant)[1].tolist():
+            here.row, number = int(rows[k]), int(variant[k])
+            statement = lines.statements[number]
+            if number in lines.calls:
                 calls_in_expressions(self.machine, here, statement)
             if isinstance(statement, ir.Instruction):
                 call_statement(self.machine, here, statement)
-            elif isinstance(statement, ast.Move) and form is not None:
-                motion, reason = motion_of(here, statement, here.store.settings)
-                forms[number] = replace(form, motion=motion, reason=reason)
-        return forms
+
+    def _kinds_of(self, world: World) -> Ints:
+        """Number points of the variable file by how they are written, (p,)."""
+        if self._kinds is None:
+            points, entries = world.initial, world.initial.entries
+            slots = entries.slots - entries.slots[:, :1]
+            columns = [entries.layout, points.taught, points.shared, *slots.T]
+            whole = [column.astype(np.int64) for column in columns]
+            self._kinds = number_rows(whole, len(slots))[0]
+        return self._kinds
 
 
-def _points(
-    here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-) -> tuple[Ints, dict[int, Pdl2Goal]]:
-    """Look up the variables that moves go to, see `MoveBlock`."""
-    program, initial = here.place.program, here.world.initial
-    point = np.full(len(rows), WRITTEN, dtype=np.int64)
-    goals: dict[int, Pdl2Goal] = {}
-    to_points = [form is not None and not form.slots for form in quiet.forms]
-    named = np.flatnonzero(np.array(to_points, dtype=bool)[variant])
-    shapes = program.lines.shape[rows[named]]
-    own = quiet.name[rows[named] - quiet.first]
-    point[named] = HELD
-    point[named[own >= 0]] = quiet.rows[own[own >= 0]]
-    asked = (point[named] < 0) | _find_assigned(here, quiet, own)
-    some = (named[asked], shapes[asked], own[asked])
-    for at, shape, name in zip(*(column.tolist() for column in some), strict=True):
-        if name >= 0:
-            key = quiet.prefix + quiet.names[name]
-        else:
-            key = _key(program.lines, int(rows[at]), *quiet.points[shape])
-        value = here.store.get_assigned(key) if key else _NO_INDEX
-        point[at] = initial.point(key) if value is None else HELD
-        if point[at] < 0:
-            value = value or here.store.read(key)
-            if isinstance(value, Nothing):
-                here.world.pin(value, UNSURE)
-            point[at], goals[at] = HELD, from_value(value)
-    initial.used[point[point >= 0]] = True
-    return point, goals
+def _read_aux(entries: Entries, points: Ints) -> Floats | None:
+    """Return auxiliary axes, (k, a), by rows of the variable file; None for none."""
+    found = None
+    layout = np.where(points >= 0, entries.layout[np.maximum(points, 0)], -1)
+    for number, mine in split_by(layout):
+        axes = entries.layouts[number].axes if number >= 0 else ()
+        for column, axis in enumerate(axes):
+            if 1 <= axis <= MOST_AXES:
+                if found is None:
+                    found = np.full((len(points), MOST_AXES), np.nan)
+                found[mine, axis - 1] = entries.aux[points[mine], column]
+    return found
 
 
-def _find_assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
+def _find_rows(here: Execution, lines: BodyLines, rows: Ints) -> Ints:
+    """Find the rows of the variable file that moves go to, (k,).
+
+    `_WRITTEN` stands for numbers in the move, `_ALONE` for what is read by itself.
+    """
+    text, initial = here.place.program.lines, here.world.initial
+    goal, plain = lines.goal[rows - lines.first], lines.plain
+    points = np.full(len(rows), _WRITTEN, dtype=np.int64)
+    named = np.flatnonzero(goal >= 0)
+    goal = goal[named]
+    points[named] = np.where(lines.rows[goal] >= 0, lines.rows[goal], _ALONE)
+    asked = ~lines.own[goal] | _find_assigned(here, lines, goal)
+    for at, name in zip(named[asked].tolist(), goal[asked].tolist(), strict=True):
+        row = int(rows[at])
+        key = lines.prefix + lines.names[name]
+        if not lines.own[name]:
+            index = plain.moves[lines.variant[row - lines.first]].index
+            root = here.world.root(here.place, lines.names[name])
+            key = _key(text, row, root, index)
+        assigned = here.store.get_assigned(key) if key else _ALONE
+        points[at] = initial.point(key) if assigned is None else _ALONE
+    points[named[points[named] < 0]] = _ALONE
+    initial.used[points[points >= 0]] = True
+    return points
+
+
+def _find_assigned(here: Execution, lines: BodyLines, names: Ints) -> Bools:
     """Tell which of the program's own variables it has given a value itself, (m,)."""
     values, found = here.store.values, np.zeros(len(names), dtype=bool)
-    own, prefix = np.flatnonzero(names >= 0), quiet.prefix
+    own, prefix = np.flatnonzero(lines.own[names]), lines.prefix
     given = [*islice(values, len(own))]
     if len(given) < len(own):  # all that there are
         known = NameColumn(k[len(prefix) :] for k in given if k.startswith(prefix))
-        found[own] = (known.find(quiet.names) >= 0)[names[own]]
+        found[own] = (known.find(lines.names) >= 0)[names[own]]
     else:
-        keys = (prefix + quiet.names[name] for name in names[own].tolist())
+        keys = (prefix + lines.names[name] for name in names[own].tolist())
         found[own] = [values.get(key) is not None for key in keys]
     return found
 
 
-def _key(lines: ProgramLines, row: int, key: str, slots: tuple[int, ...]) -> str:
+def _key(
+    lines: Statements[ir.SourceStatement], row: int, key: str, slots: tuple[int, ...]
+) -> str:
     """Return where the point of a move is stored, "" where its index is not known."""
     index = [float(lines.value[lines.first[row] + slot]) for slot in slots]
     if not all(number.is_integer() for number in index):

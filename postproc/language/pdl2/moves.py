@@ -108,7 +108,9 @@ def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Pdl2Goal:
     where = statement.where
     match statement.how:
         case "TO":
-            return absolute(here, where[0])
+            goal = absolute(here, where[0])
+            unread = goal.why is IN_PART and _is_unread(here, where[0])
+            return replace(goal, why=_UNREAD) if unread else goal
         case "RELATIVE":
             vector, frame = here.value(where[0]), _FRAME.get(statement.frame)
             if isinstance(vector, Vector) and frame is not None:
@@ -134,6 +136,15 @@ def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Pdl2Goal:
             if isinstance(by, Position) and by.joints:
                 return _no_target(Meaning.BY, by.numbers, "BY")
     return Pdl2Goal(Meaning.UNKNOWN, why=_why(statement.how))
+
+
+_UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read")
+
+
+def _is_unread(here: Execution, place: ir.Operand) -> bool:
+    """Tell whether a number of a written target cannot be read."""
+    numbers = (one for one in ir.walk(place) if isinstance(one, ir.Num))
+    return not all(math.isfinite(here.number(one.slot)) for one in numbers)
 
 
 def _why(word: str) -> Reason:
@@ -265,6 +276,17 @@ _FROM_HERE = frozenset(
     {Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
      Meaning.AWAY, Meaning.ABOUT, Meaning.BY, Meaning.FOR}
 )  # fmt: skip
+
+
+def read_move(here: Execution, statement: ast.Move) -> Pdl2Visit:
+    """Read a move of our arm that nothing but its target tells from others."""
+    settings = _with(here, statement)
+    motion, reason = motion_of(here, statement, settings)
+    goal, why = goal_of(here, statement, motion), here.reason or reason
+    return Pdl2Visit(
+        here.place, motion, False, goal, settings, why=why, at=here.row,
+        fly=statement.fly,
+    )  # fmt: skip
 
 
 def move(machine: Machine, here: Execution, statement: ast.Move) -> None:

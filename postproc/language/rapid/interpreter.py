@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeGuard
 
@@ -39,8 +39,6 @@ from postproc.language.rapid.modal_state import (
 )
 from postproc.language.rapid.moves import (
     RapidGoal,
-    are_targets,
-    own_numbers,
     pose_of,
 )
 from postproc.language.rapid.program import is_move
@@ -129,13 +127,6 @@ class RapidMachine(TaskMachine):
         """Return all routines of a kind."""
         return [one for one in self.task.every_routine if one.rows.head.kind == kind]
 
-    def places_of(self, one: ir.SourceStatement) -> Sequence[int] | None:
-        """Return place and turn of MoveL to numbers, see `TaskMachine.places_of`."""
-        if not isinstance(one, ir.Instruction) or "movel" in self.task.routines:
-            return None
-        return own_numbers(one)
-
-    is_plain = staticmethod(are_targets)
     is_move = staticmethod(is_move)
 
     @staticmethod
@@ -143,9 +134,14 @@ class RapidMachine(TaskMachine):
         """Count up or down."""
         return 1.0 if last >= first else -1.0
 
-    def apart(self, context: Context) -> set[int] | None:
-        """Return all (None) where an error may lead to any statement."""
-        return None if self._exits_of(context) else set()
+    def reads_at_once(self, context: Context) -> bool:
+        """Return False where an error may lead to any statement.
+
+        No moves are where procedures are called on the way of some: these may set what
+        the moves behind are made with, until the arm stops.
+        """
+        alone = self._exits_of(context) or self.task.find_calls & {*SYNCHRONOUS}
+        return super().reads_at_once(context) and not alone
 
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""

@@ -20,6 +20,7 @@ from postproc.language.analysis.found_goals import (
     FoundVisit,
     not_reached,
 )
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.values import (
     Value,
     WrittenNumber,
@@ -29,7 +30,7 @@ from postproc.language.analysis.values import (
 from postproc.language.rapid.instructions import MOTIONS, Signature
 from postproc.language.rapid.modal_state import EMPTY_HAND, Modes
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT, WIDTH
-from postproc.language.rapid.symbols import SHIFTS, RapidTask
+from postproc.language.rapid.symbols import COUNTS, SHIFTS, RapidTask
 from postproc.language.shifts import IDENTITY, Pose, Shift, flat
 from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
@@ -251,7 +252,7 @@ class RapidGoal(goals.GoalReader):
             return None
         parts = [[*list_leaves(part)] for part in value]
         own = [[x for x in part if isinstance(x, WrittenNumber)] for part in parts]
-        if own != parts or tuple(map(len, own)) not in _COUNTS:
+        if own != parts or tuple(map(len, own)) not in COUNTS:
             return None
         numbers = [one for part in own[:-1] for one in part]
         slots = goals.list_slots(numbers, WIDTH)
@@ -270,40 +271,22 @@ class RapidGoal(goals.GoalReader):
             why=NO_REASON if known else _NO_QUATERNION,
         )  # fmt: skip
 
-    def read_point(self, operand: ir.Operand | None) -> FoundGoal:
-        """Read a point; fast where all of its numbers stand in one statement."""
-        file, row, written, name = self.here.file, self.here.row, operand, ""
-        if isinstance(operand, ir.DataObject) and not operand.steps:
-            found = self.task.constant(operand.name, self.here)
-            if found is not None:
-                file, row, written = found[0], found[1].row, found[1].value
-                name = operand.name
-        goal = None
-        if isinstance(written, ir.Composite):
-            goal = self._read_written(written, file, row)
-        if goal is None:
-            return super().read_point(operand)
-        return self.name_goal(goal, name) if name else goal
+    def goal_of(
+        self,
+        target: TargetSlots,
+        numbers: Sequence[float | None],
+        outside: Sequence[float | None],
+    ) -> FoundGoal:
+        """Return where numbers lead, see `GoalReader.goal_of`."""
+        own, axes = ([x for x in some if x is not None] for some in (numbers, outside))
+        return self._goal_of(own, axes)
 
-    def _read_written(
-        self, written: ir.Composite, file: int, row: int
-    ) -> FoundGoal | None:
-        """Read a point that is written in numbers alone, None for any other."""
-        known = self.task.written_points
-        if id(written) not in known:
-            known[id(written)] = written, _plain_slots(written)
-        slots = known[id(written)][1]
-        if not slots:
-            return None
-        text = self.task.files[file].text
-        at = [int(text.first[row]) + slot for slot in slots]
-        values, count = text.value[at].tolist(), len(slots) - 6
-        found = self._goal_of(values[:count], values[count:])
-        if not np.isfinite(values).all() or found.why:
-            return None
-        begin = self.task.numbering.first[file]
-        own = [begin + slot for slot in at[:count]]
-        return replace(found, slots=(*own, *(-1,) * (WIDTH - count)))
+    @staticmethod
+    def are_sound(target: TargetSlots, numbers: Floats) -> Bools:
+        """Tell which targets are joint angles, or a place and a rotation."""
+        known = all_in_rows(np.isfinite(numbers[:, np.array(target.slots) >= 0]))
+        turned: Bools = (numbers[:, 3:7] ** 2).sum(axis=1) > SHORTEST**2
+        return known if target.joints else known & turned
 
     def read_special(self, operand: ir.Operand | None) -> FoundGoal | None:
         """Read Offs and RelTool: the point is moved along."""
@@ -392,48 +375,6 @@ def _motion(name: str, signature: Signature) -> Motion:
 def _is_unit(q: Sequence[float]) -> bool:
     """Tell whether four numbers say a rotation."""
     return sum(c * c for c in q) > SHORTEST**2
-
-
-def are_targets(numbers: Floats) -> Bools:
-    """Tell which x, y, z, q1 to q4, (m, 7), are a place and a rotation, (m,)."""
-    turned: Bools = (numbers[:, 3:] ** 2).sum(axis=1) > SHORTEST**2
-    return turned & all_in_rows(np.isfinite(numbers))
-
-
-def own_numbers(one: ir.Instruction) -> list[int] | None:
-    """Return which numbers of ``MoveL [[..], ..], ..`` are its place and rotation.
-
-    None for other instructions, and where anything else is more than a name or number.
-    """
-    if one.name != "movel" or not one.arguments:
-        return None
-    to, *others = (argument.value for argument in one.arguments)
-    simple = (
-        value is None
-        or isinstance(value, ir.Num)
-        or (isinstance(value, ir.DataObject) and not value.steps)
-        for value in others
-    )
-    if not isinstance(to, ir.Composite) or not all(simple):
-        return None
-    slots = _plain_slots(to)
-    return slots[:7] if len(slots) == 17 else None
-
-
-_COUNTS: tuple[tuple[int, ...], ...] = (
-    (3, 4, 4, 6),
-    (6, 6),
-)  # numbers of a robtarget and of a jointtarget
-
-
-def _plain_slots(operand: ir.Composite) -> list[int]:
-    """Return the slots of ``[[1, 2, ..], ..]`` of a target, nothing for all else."""
-    parts = [part.items for part in operand.items if isinstance(part, ir.Composite)]
-    if tuple(map(len, parts)) not in _COUNTS or len(parts) != len(operand.items):
-        return []
-    leaves = [leaf for part in parts for leaf in part]
-    slots = [leaf.slot for leaf in leaves if isinstance(leaf, ir.Num)]
-    return slots if len(slots) == len(leaves) else []
 
 
 def pose_of(found: Value | None) -> tuple[float, ...]:

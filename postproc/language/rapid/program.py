@@ -87,16 +87,18 @@ def read_rapid(source: Source) -> RapidFile:
     odd = text.of_kind(holds_odd)
     called = ir.Instruction | ir.CompactIf
     for row in text.of_kind(lambda s: not (isinstance(s, called) or holds_odd(s))):
-        outline.take(row, text.statement(row), outline.name("module"))
+        module = outline.name("module")
+        if not outline.declare(row, module):
+            outline.take(row, text.statement(row), module)
     outline.close()
     # Without its end, calls may stand behind a record.
     ended = (r for r in outline.of("record") if r.ended)
     within = {row for r in ended for row in range(r.first, r.last + 1)}
     moves = [row for row in text.where(is_move) if row not in within]
-    for row in (row for row in text.where(_lacks_position) if row not in within):
-        outline.complain(row, "has too few positions")
-    for row in (row for row in odd if row not in within):
-        outline.complain(row, "is not understood")
+    few = text.where(_lacks_position)
+    for rows, what in ((few, "has too few positions"), (odd, "is not understood")):
+        for row in (row for row in rows if row not in within):
+            outline.complain(row, what)
     return RapidFile(**outline.parts(moves), modules=tuple(outline.of("module")))
 
 

@@ -12,6 +12,7 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.declarations import Datum, TaskRoutine
+from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import (
@@ -33,7 +34,7 @@ from postproc.language.rapid.instructions import (
     SYNCHRONOUS,
     read_controller_data,
 )
-from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT
+from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT, WIDTH
 from postproc.language.rapid.program import RapidFile
 from postproc.language.shifts import Shift, ShiftKind
 
@@ -65,6 +66,8 @@ RECORDS: Mapping[str, Layout] = {
     ),
 }  # fmt: skip
 """Components of data by type."""
+COUNTS: tuple[tuple[int, ...], ...] = ((3, 4, 4, 6), (6, 6))
+"""How many numbers stand in the parts of a robtarget, and of a jointtarget."""
 _READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
 
 
@@ -73,7 +76,6 @@ class RapidTask(TaskSymbols[RapidFile]):
     """The modules of a task.
 
     Attributes:
-        written_points: Slots of points in numbers, by the identity of these.
         frames, conditions: Tools and work objects that have been read, by name; and
             with zones and speeds, by arguments.
     """
@@ -84,9 +86,6 @@ class RapidTask(TaskSymbols[RapidFile]):
     targets = ("robtarget", "jointtarget")
     functions = "func"
     controller_data = staticmethod(read_controller_data)
-    written_points: dict[int, tuple[ir.Composite, list[int]]] = field(
-        default_factory=dict
-    )
     frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
     conditions: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = (
         field(default_factory=dict)
@@ -122,6 +121,38 @@ class RapidTask(TaskSymbols[RapidFile]):
             and datum.kind != "const"
             and not self.is_used_beside(name, here)
         )
+
+    def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
+        """Return where a plain move goes, see `TaskSymbols.plain_end`."""
+        if not isinstance(one, ir.Instruction) or one.name in self.routines:
+            return None
+        signature = MOTIONS.get(one.name)
+        if signature is None or signature.via >= 0 or not signature.reaches:
+            return None
+        to, _ = signature.operands(one.arguments)
+        others = (a.value for a in one.arguments if a.value is not to)
+        simple = (
+            value is None
+            or isinstance(value, ir.Num)
+            or (isinstance(value, ir.DataObject) and not value.steps)
+            for value in others
+        )
+        passed_on = any(argument.passed_on for argument in one.arguments)
+        return to if all(simple) and not passed_on else None
+
+    def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
+        """Return the numbers of ``[[1, 2, ..], ..]``, see `TaskSymbols.read_slots`."""
+        items = operand.items if isinstance(operand, ir.Composite) else ()
+        parts = [part.items for part in items if isinstance(part, ir.Composite)]
+        if tuple(map(len, parts)) not in COUNTS or len(parts) != len(items):
+            return None
+        leaves = [leaf for part in parts for leaf in part]
+        slots = [leaf.slot for leaf in leaves if isinstance(leaf, ir.Num)]
+        if len(slots) < len(leaves):
+            return None
+        numbers, outside = tuple(slots[:-6]), tuple(slots[-6:])
+        filled = (*numbers, *(-1,) * (WIDTH - len(numbers)))
+        return TargetSlots(filled, outside, joints=len(numbers) < WIDTH)
 
     def note_odd(self, uses: NamesUsed) -> None:
         """Note words of what is not understood; but a move sets nothing."""

@@ -19,7 +19,9 @@ from postproc.language.analysis.control_flow import (
     is_structural,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
+from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.statement_table import StatementText
+from postproc.language.text.templates import name_index
 from postproc.language.visits import Diagnostic
 
 
@@ -60,10 +62,31 @@ class Outline:
     _open: list[tuple[str, int, ir.SourceStatement]] = field(default_factory=list)
     _blocks: FlowReader = field(default_factory=FlowReader)
     _before: ControlFlow | None = None  # the handlers of the routine
+    _declared: dict[int, tuple[Datum, str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Read blocks from the first statement on."""
         self._begin_blocks()
+        self._find_declared()
+
+    def _find_declared(self) -> None:
+        """Find declarations of one name, the only one in them that has a digit.
+
+        What they say is not built: it is that of their form.
+        """
+        text, shapes = self.text, self.text.shapes
+        found = dict[int, Datum]()
+        for form, one in enumerate(text.said.said):
+            if isinstance(one, ir.Declaration) and len(one.items) == 1:
+                alone = shapes.texts[form].count(NAME_MARK) == 1
+                if alone and name_index(one.items[0].name) == 0:
+                    (found[form],) = list_data(one, -1, "", "")
+        form_of = text.said.form[text.shape]
+        rows = np.flatnonzero(np.isin(form_of, [*found]))
+        at = shapes.name[shapes.first[text.shape[rows]]].astype(np.int64)
+        own = [found[k] for k in form_of[rows].tolist()]
+        pairs = zip(own, shapes.names.take(at).lower(), strict=True)
+        self._declared = dict(zip(rows.tolist(), pairs, strict=True))
 
     def _begin_blocks(self) -> None:
         self._blocks = FlowReader(self.text.line, tell_open=self._tell_open)
@@ -83,6 +106,17 @@ class Outline:
         """Return the name of the innermost open scope of some kinds."""
         heads = (said for kind, _, said in reversed(self._open) if kind in kinds)
         return getattr(next(heads, None), "name", "")
+
+    def declare(self, row: int, module: str) -> bool:
+        """Take a declaration of a single numbered name; return False for all else."""
+        if row not in self._declared:
+            return False
+        form, name = self._declared[row]
+        self.data.append(Datum(
+            name, form.type, row, module, self.name(*self.words.routines), form.value,
+            dimensions=form.dimensions, kind=form.kind, scope=form.scope,
+        ))  # fmt: skip
+        return True
 
     def take(self, row: int, one: ir.SourceStatement, module: str) -> None:
         """Take the next statement.

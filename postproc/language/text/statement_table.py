@@ -13,6 +13,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Indices, release_memory
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
+from postproc.language import ir
 from postproc.language.text import templates
 from postproc.language.text.source import NumberSpans, Source, Span
 from postproc.language.visits import Diagnostic
@@ -70,17 +71,25 @@ class Statements(Generic[T]):
     def where(
         self, test: Callable[[T], bool], first: int = 0, behind: int | None = None
     ) -> list[int]:
-        """List statements that pass a test, which is asked once for each shape.
+        """List statements that pass a test that no name but what they call decides.
 
         Args:
-            test: The test.
+            test: The test; it is asked once for each form that calls nothing by a name
+                with a digit.
             first: The first row to look at.
             behind: The row behind the last one.
         """
         shape = self.shape[first:behind]
         number, example = templates.number_in_order(shape)
-        passed = [test(self.said[k]) for k in shape[example].tolist()]
-        rows = first + np.flatnonzero(np.array(passed, dtype=bool)[number])
+        passed, known = np.zeros(len(example), dtype=bool), dict[int, bool | None]()
+        for k, own in enumerate(shape[example].tolist()):
+            form = int(self.said.form[own])
+            if form not in known:
+                one = self.said.said[form]
+                known[form] = None if _calls_open(one) else test(one)
+            found = known[form]
+            passed[k] = test(self.said[own]) if found is None else found
+        rows = first + np.flatnonzero(passed[number])
         return [*rows.tolist()]
 
     @property
@@ -99,6 +108,12 @@ class Statements(Generic[T]):
     def without_values(self) -> Self:
         """Let go of what the numbers are worth: it can be read again."""
         return replace(self, value=np.empty(0))
+
+
+def _calls_open(one: object) -> bool:
+    """Tell whether the name of what a statement calls is open in its form."""
+    inner = ir.inside(one) if isinstance(one, ir.SourceStatement) else one
+    return templates.name_index(getattr(inner, "name", "")) >= 0
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ from tests.generated.neutral.languages import LANGUAGES, Language
 from tests.generated.neutral.run import Run, Step
 from tests.generated.neutral.text import SHIFTS, Printed
 from tests.generated.neutral.tree import Program
+from tests.language.one_by_one import differing, read
 from tests.made_visits import visits as made_visits
 
 RUNS = 3  # of a program that asks for inputs
@@ -86,9 +87,11 @@ def lands(seed: int, language: str, cell: Cell, model: Model) -> Found:
 
     Raises:
         AssertionError: A byte outside of the targets changed, the source is not given
-            back, other moves are made, or one that the tool did not predict.
+            back, other moves are made, or one that the tool did not predict; or blocks
+            of moves are not read as their moves one by one.
     """
     one, found = case(seed, language, cell), Found()
+    assert_read_alike(one.text.files, cell)
     try:
         done = compensated(one.text.files, cell, model, seed % 4 < 2)
     except PostprocError as refused:
@@ -105,6 +108,15 @@ def lands(seed: int, language: str, cell: Cell, model: Model) -> Found:
         rows = follow(done.visits, asked, one.text, one.language)
         count(found, seed, one, done, (asked, ran), rows, cell)
     return found
+
+
+def assert_read_alike(files: Mapping[str, bytes], cell: Cell) -> None:
+    """Read a program with blocks of moves, and without."""
+    try:
+        found = read(files, cell, least=2)
+    except PostprocError:
+        return
+    assert [*differing(found, read(files, cell))] == []
 
 
 def compensated(

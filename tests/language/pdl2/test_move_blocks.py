@@ -5,6 +5,7 @@ import random
 import numpy as np
 import pytest
 
+from postproc.diagnostics import Code
 from postproc.language.language import Start
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.move_blocks import MoveBlocks
@@ -185,3 +186,24 @@ def test_moves_that_are_looked_at_twice_are_listed_once() -> None:
     assert all(
         "known only at run time" in visits.reasons[k].text for k in visits.reason
     )
+
+
+def test_a_number_that_cannot_be_read_is_told_between_blocks() -> None:
+    six = "POS({}, 2, 3, 4, 5, 6, '')"
+    places = [six.format(k) for k in (1, "1e999", 2, 3, 4, 5, 6)]
+    moves = "\n".join(f"MOVE LINEAR TO {place}" for place in places)
+    text = f"PROGRAM a\nBEGIN\n{moves}\nEND a"
+    found = resolve(parse(source_from_bytes("a.pdl", text.encode()))).visits
+    codes = [found.reasons[k].code for k in found.reason.tolist()]
+    assert codes[1] is Code.UNREADABLE_NUMBER
+    assert Code.UNREADABLE_NUMBER not in codes[2:7]
+
+
+def test_a_file_of_one_point_stands_beside_points_that_are_assigned() -> None:
+    given = "\n".join(f"p{k} := POS({k}, 2, 3, 4, 5, 6, '')" for k in range(3))
+    moves = "\n".join(f"MOVE TO {name}" for name in ("w", "p0", "w", "p1", "p2", "w"))
+    text = f"PROGRAM a\nVAR w, p0, p1, p2 : POSITION\nBEGIN\n{given}\n{moves}\nEND a"
+    values = b"w POS Priv\n X: 9 Y: 8 Z: 7 A: 6 E: 5 R: 4\n CNFG: ''\n"
+    variables = read_variables(source_from_bytes("a.lsv", values))
+    found = resolve(parse(source_from_bytes("a.pdl", text.encode())), None, variables)
+    assert found.visits.target.values[:, 0].tolist() == [9, 0, 9, 1, 2, 9]

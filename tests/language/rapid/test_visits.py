@@ -298,6 +298,13 @@ def test_rounds_of_a_loop_are_told_apart():
     assert len(np.unique(found.visits.target.literal)) == 3
 
 
+def test_an_element_is_known_where_others_are_not():
+    more = f"CONST robtarget mixed{{2}}:=[[[9,0,0],[1,0,0,0],{END},elsewhere];"
+    found = once(L.format("mixed{1}"), L.format("mixed{2}"), more=more)
+    assert (found.visits.target.literal >= 0).tolist() == [True, False]
+    assert found.visits.target.values[0, 0] == 9.0
+
+
 def test_calls_are_followed_across_modules():
     other = f"MODULE o\nPROC weld()\n{L.format('p2')}\nENDPROC\nENDMODULE\n"
     found = once("weld;", L.format("p1"), "weld;", others=[other])
