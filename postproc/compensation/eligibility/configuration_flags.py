@@ -35,7 +35,7 @@ AFTER = Reason(
 )
 FROM_ANYWHERE = Reason(
     Code.CONFIGURATION_UNKNOWN,
-    "whether its configuration flags count is not sure here, and the place before, "
+    "whether its configuration flags count is not known here, and the place before, "
     "whose configuration the arm keeps otherwise, is not known: add a move by joint "
     "angles before it",
 )
