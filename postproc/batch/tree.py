@@ -164,6 +164,7 @@ def _sort(
         setup = plan.setup_of(programs[main], arms[main])
         own = [programs[page] for page in pages]
         reads = _find_shared(root, programs[main], listing)
+        reads = tuple(place for place in reads if place not in own)
         _add_unit(programs[main], own, reads, variables, setup, part)
     return part
 

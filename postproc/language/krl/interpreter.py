@@ -158,7 +158,7 @@ class KrlMachine(TaskMachine):
     def _has_interrupts(self) -> bool:
         """Return True if interrupts or triggers may call routines."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for text in self.texts for one in text.said)
+        said_ones = (one for file in self.task.files for one in file.text.said)
         return any(isinstance(one, kinds) for one in said_ones)
 
     # What it does.
@@ -333,10 +333,10 @@ class KrlMachine(TaskMachine):
     def _interrupts(self) -> list[_InterruptStatement]:
         """List all that programs say of interrupts, but for submit programs."""
         found, kinds = [], said.InterruptDeclared | said.InterruptSwitched
-        for file, text in enumerate(self.texts):
-            if self.task.files[file].is_submit:
+        for file, own in enumerate(self.task.files):
+            if own.is_submit:
                 continue
-            here = Scope(file, self.task.files[file].name, "")
+            text, here = own.text, Scope(file, own.name, "")
             for row in text.where(lambda one: isinstance(one, kinds)):
                 one, around = text.statement(row), self.task.routine_around(file, row)
                 word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
