@@ -172,7 +172,7 @@ def _name_lists(path: Path, text: bytes) -> Named:
              if KrlFileName(other.name).is_data_list
              and other.stem.lower() != path.stem.lower()
              and other.is_file() and not other.is_symlink()]  # fmt: skip
-    public = [(list_.program, _points_for_all(list_, at.st_mtime_ns, at.st_size))
+    public = [(list_, _points_for_all(list_, at.st_mtime_ns, at.st_size))
               for list_, at in lists]  # fmt: skip
     if not any(points for _, points in public):
         return {}
@@ -183,8 +183,9 @@ def _name_lists(path: Path, text: bytes) -> Named:
     for other, points in public:
         places = [lines[name] for name in points & lines.keys()]
         if places:
+            own = find_beside(Path(other.place), Path(other.program).name)
             line = text.count(b"\n", 0, min(places)) + 1
-            found[KrlFileName(other).key] = line
+            found[KrlFileName(str(own or other.place)).key] = line
     return found
 
 
@@ -192,7 +193,8 @@ def _name_lists(path: Path, text: bytes) -> Named:
 def _points_for_all(file: KrlFileName, changed: int, size: int) -> frozenset[bytes]:
     """Return the points that a list declares for all programs, in lower case.
 
-    A list whose source moves belongs to that source, whoever else names its points.
+    A list whose source moves belongs to that source, whoever else names its points. A
+    list needs no source.
     """
     place = Path(file.place)
     text = read_if_readable(place)
@@ -200,5 +202,5 @@ def _points_for_all(file: KrlFileName, changed: int, size: int) -> frozenset[byt
         return frozenset()
     names = frozenset(name.lower() for name in _SHARED_POINT.findall(text))
     own = find_beside(place, Path(file.program).name) if names else None
-    moves = own is None or _MOVE.search(read_if_readable(own)) is not None
+    moves = own is not None and _MOVE.search(read_if_readable(own)) is not None
     return frozenset() if moves else names
