@@ -570,6 +570,14 @@ class Code(StrEnum):
         "not followed.",
         "Reset it before targets that have to be exact.",
     )
+    ACCURATE_POINT = (
+        "accurate-point",
+        WARNING,
+        "S of the point has bit 4: it was taught while the controller's own accuracy "
+        "model was on, and does not hold the pose of an arm without it.",
+        "Teach the point again with that model off. Subtract 16 from S only where its "
+        "numbers are known to be meant without the model.",
+    )
     LOAD_UNKNOWN = (
         "load-unknown",
         WARNING,
