@@ -153,12 +153,12 @@ class RapidMachine(TaskMachine):
 
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
-        handlers = self._handlers_of(context)
-        if handlers.moves:
-            here = self._end_blocking(context.outer, _after(handlers, here))
         if context.outer is self.root:
-            self.ends.append(here)
-        return here
+            self.ends.append(self._end_blocking(None, here))
+        handlers = self._handlers_of(context)
+        if not handlers.moves:
+            return here
+        return self._end_blocking(context.outer, _after(handlers, here))
 
     def _end_blocking(self, context: Context | None, here: Arrived) -> Arrived:
         """Return it where the program goes on in a routine, None for the next cycle.
