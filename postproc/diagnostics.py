@@ -589,7 +589,9 @@ class Code(StrEnum):
         WARNING,
         "A concurrent program, an interrupt or a trap may move the arm, or change the "
         "settings of the move.",
-        "Let it set a signal, and act in the program.",
+        "Let it set a signal, and act in the program. If it calls an unavailable "
+        'routine that moves nothing, write NAME = "motionless" under [routines] of the '
+        "cell.",
     )
 
     # Why a target keeps its values: what the plan finds.
