@@ -570,6 +570,14 @@ class Code(StrEnum):
         "not followed.",
         "Reset it before targets that have to be exact.",
     )
+    ACCURATE_POINT = (
+        "accurate-point",
+        WARNING,
+        "S of the point has bit 4: it was taught while the controller's own accuracy "
+        "model was on, and does not hold the pose of an arm without it.",
+        "Teach the point again with that model off. Subtract 16 from S only where its "
+        "numbers are known to be meant without the model.",
+    )
     LOAD_UNKNOWN = (
         "load-unknown",
         WARNING,
@@ -581,7 +589,9 @@ class Code(StrEnum):
         WARNING,
         "A concurrent program, an interrupt or a trap may move the arm, or change the "
         "settings of the move.",
-        "Let it set a signal, and act in the program.",
+        "Let it set a signal, and act in the program. If it calls an unavailable "
+        'routine that moves nothing, write NAME = "motionless" under [routines] of the '
+        "cell.",
     )
 
     # Why a target keeps its values: what the plan finds.

@@ -140,6 +140,9 @@ def _sort(
     lists = {f.data_list.lower() for p, f in files.items() if p not in system}
     ours = [p for p, f in files.items() if f.is_program or p.lower() in lists]
     ours = [p for p in ours if p not in system]
+    lone = {p for p, f in files.items() if f.is_data_list and not f.is_shared}
+    lone.difference_update(ours, (files[p].data_list for p in system))
+    ours += [p for p in files if p in lone]
     programs = _by_base(ours, lambda place: files[place].key, part)
     values = (p for p, f in files.items() if f.is_variables)
     variables = _by_base(values, base_name, part)
@@ -161,9 +164,13 @@ def _sort(
             (place, f"{n!r} is outside of its folder: not followed") for n in outside
         ]
     for main, pages in _assign_pages(named, variables, arms).items():
+        if programs[main] in lone:  # and no program's alone
+            part.copies.append(programs[main])
+            continue
         setup = plan.setup_of(programs[main], arms[main])
         own = [programs[page] for page in pages]
         reads = _find_shared(root, programs[main], listing)
+        reads = tuple(place for place in reads if place not in own)
         _add_unit(programs[main], own, reads, variables, setup, part)
     return part
 

@@ -99,7 +99,10 @@ def find_pages(program: Path) -> Pages:
     }
     pages = group_pages(alone).get(main, ())
     notes += _list_omitted(programs, named, (main, *pages), apart)
-    return Pages(tuple(programs[page] for page in pages), tuple(notes), reads)
+    found = tuple(programs[page] for page in pages)
+    own = {path.absolute() for path in found}
+    reads = tuple(path for path in reads if path.absolute() not in own)
+    return Pages(found, tuple(notes), reads)
 
 
 def archive_notes(program: Path, cell: Cell) -> tuple[Diagnostic, ...]:

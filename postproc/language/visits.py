@@ -476,6 +476,18 @@ class Visits:
         """Return the name of the file that the move of a visit stands in."""
         return self.files[int(self.place.file[visit])]
 
+    def list_lines(self, visits: Ints, file: int) -> list[str]:
+        """List the lines of the moves of visits, each once.
+
+        Those that stand in another file than the one of an index have its name.
+        """
+        numbers, lines = self.place.file[visits], self.place.line[visits]
+        places = zip(numbers.tolist(), lines.tolist(), strict=True)
+        return [
+            str(line) if k == file else f"{self.files[k]}:{line}"
+            for k, line in dict.fromkeys(places)
+        ]
+
     def target_name(self, visit: int) -> str:
         """Return the variable of the target of a visit, "" where it is inline."""
         return str(self.target.names[self.target.name[visit]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -136,3 +137,22 @@ def test_a_batch_lists_it_before_any_file(lists, job_folder):
 
 def test_a_folder_without_lists_is_no_archive(tmp_path):
     assert read_archive(tmp_path) is None
+
+
+def test_a_list_without_a_source_belongs_to_the_program_that_goes_there(
+    archive, job_folder
+):
+    weld = archive / "KRC/R1/Program/weld"
+    text = (weld / "job.dat").read_text()
+    (weld / "job.dat").unlink()
+    text = text.replace("DEFDAT job", "DEFDAT points PUBLIC").replace("DECL", "GLOBAL")
+    (weld / "points.dat").write_text(text)
+    run = batch(archive, job_folder, "--set", "compensation.edit_exported=true")
+    assert run.exit_code in (0, 1), run.output
+    out = archive / "out/R1/Program/weld"
+    assert (out / "points.dat.postproc.json").is_file()
+    (weld / "other.src").write_text("DEF other( )\nPTP XP0\nEND\n")
+    shutil.rmtree(archive / "out")
+    run = batch(archive, job_folder)
+    assert run.exit_code == 1, run.output
+    assert (out / "points.dat").read_bytes() == (weld / "points.dat").read_bytes()

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from postproc.compensation.options import Options
 from tests.compensation.shift_jobs import (
     Shop,
     flags,
@@ -313,3 +314,14 @@ def test_krl_follows_a_value_of_a_data_list_and_does_not_correct_it(shop, krl_po
     assert np.array_equal(before[0], after[0])
     assert np.abs(before[1] - after[1]).max() > 0.02
     assert any("outlives" in why for why in done.visits.literals.pinned)
+
+
+def test_reasons_name_lines_of_the_source_where_points_are_cloned(job_cell, job_model):
+    lines = [go("p2"), go("p1"), go("p3"), go("p1"), "q:=p2;", "q.trans.x:=n;", go("q")]
+    shop = Shop.of(job_cell, job_model, Options(shared_points="clone"))
+    source = rapid(shop, lines, "", "VAR robtarget q;\nVAR num n;")
+    done = shop.compensate({"m.mod": source})
+    assert "cloned" in {found.code for found in done.diagnostics}
+    line = 1 + source[: source.index(b"q.trans.x")].count(b"\n")
+    texts = [done.visits.reasons[k].text for k in done.visits.reason.tolist()]
+    assert f"set in line {line} of m.mod" in texts[-1]

@@ -79,6 +79,14 @@ def test_lists_with_points_for_all_programs(tmp_path, other, named):
     assert ({p.name for p in pages} == {"points.src", "points.dat"}) == named
 
 
+def test_a_list_needs_no_source(tmp_path):
+    for name, text in (("job.src", USER), ("points.dat", POINTS)):
+        (tmp_path / name).write_bytes(text)
+    assert [p.name for p in find_pages(tmp_path / "job.src").paths] == ["points.dat"]
+    (tmp_path / "other.src").write_bytes(USER.replace(b"job", b"other"))
+    assert find_pages(tmp_path / "job.src").paths == ()
+
+
 def test_points_that_several_programs_go_to_belong_to_none(tmp_path):
     for name, text in (
         ("job.src", USER), ("other.src", USER.replace(b"job", b"other")),

@@ -12,7 +12,15 @@ from postproc.diagnostics import Code, Reason
 from postproc.language.visits import Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.planner import Plan
-from postproc.motion.targets import STRANDS, TargetKind, Targets
+from postproc.motion.targets import (
+    CODE,
+    PATH_JUMP,
+    PATH_LIMITS,
+    PATH_REACH,
+    STRANDS,
+    TargetKind,
+    Targets,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
 
@@ -49,8 +57,19 @@ STOPPED = Reason(
     "the controller stops at the previous target, or may, because of its configuration "
     "flags, so that the approach is not known: correct these first",
 )
-CONTRADICTED, BEYOND_REACH, BEHIND_STOP = 1, 2, 4
-"""Why what comes from a visit is doubtful."""
+_ON_THE_WAY = "on the way to the previous target, so that the approach is not known"
+BROKEN_PATHS = {
+    PATH_REACH: f"the arm leaves its reach {_ON_THE_WAY}: lead that path elsewhere",
+    PATH_JUMP: f"a singularity lies {_ON_THE_WAY}: lead that path elsewhere",
+    **{
+        PATH_LIMITS[j]: f"axis {j + 1} would be beyond its limit {_ON_THE_WAY}: lead "
+        "that path elsewhere"
+        for j in range(6)
+    },
+}
+"""Why an approach is not known where the path before it cannot be driven."""
+CONTRADICTED, BEYOND_REACH, BEHIND_STOP, BEHIND_PATH = 1, 2, 4, 8
+"""Why what comes from a visit is doubtful; the last is shifted by the broken path."""
 
 
 @dataclass(frozen=True)
@@ -150,15 +169,19 @@ def mark_stranded(
         begun: Whether what comes from the first visit is doubtful, as returned.
 
     Returns:
-        Whether what comes from a visit is doubtful, and why: 0, or BEYOND_REACH and
-        BEHIND_STOP, (n,).
+        Whether what comes from a visit is doubtful, and why: 0, or BEYOND_REACH,
+        BEHIND_STOP and BEHIND_PATH with its shifts, (n,).
     """
     found = np.zeros(len(visits), dtype=np.int64)
     placed = _find_placed(targets)
-    for why, rows, reason, sure in (
-        (BEYOND_REACH, STRANDS[plan.reason], STRANDED, np.zeros_like(placed)),
-        (BEHIND_STOP, np.array(targets.stops), STOPPED, placed),
-    ):
+    never, broken = np.zeros_like(placed), [CODE[one] for one in BROKEN_PATHS]
+    beyond = STRANDS[plan.reason] & ~np.isin(plan.reason, broken)
+    causes = [(BEYOND_REACH, beyond, STRANDED, never)]
+    for k, (cause, text) in enumerate(BROKEN_PATHS.items()):
+        why, rows = BEHIND_PATH << k, np.asarray(plan.reason == CODE[cause])
+        causes.append((why, rows, Reason(STRANDED.code, text), never))
+    causes.append((BEHIND_STOP, np.array(targets.stops), STOPPED, placed))
+    for why, rows, reason, sure in causes:
         rows[:1] |= bool(begun & why)
         if rows.any():
             reached, on = _followers(visits, rows, placed)

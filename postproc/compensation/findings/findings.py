@@ -103,9 +103,14 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
         f"targets without a value: {lost.sum()}, and there is no {name}. Put it beside "
         "the program, or give it with --variables"
     )
-    first = visits.place.line[np.flatnonzero(lost)[:1]].tolist()
     return [
-        Diagnostic(visits.files[0], line, Code.NO_VARIABLE_FILE, text) for line in first
+        Diagnostic(
+            visits.file_name(row),
+            int(visits.place.line[row]),
+            Code.NO_VARIABLE_FILE,
+            text,
+        )
+        for row in np.flatnonzero(lost)[:1].tolist()
     ]
 
 
@@ -320,8 +325,10 @@ def report_uncertain_sides(
     size = np.linalg.norm(std_error, axis=1) / MM
     cure = "start the approach farther away, or so that the axis does not reverse"
     if len(rows) > SINGLY:
-        worst = rows[np.argsort(-size[rows])[:5]]
-        lines = ", ".join(str(line) for line in np.unique(visits.place.line[worst]))
+        first, worst = rows[0], rows[np.argsort(-size[rows])[:5]]
+        place = visits.place
+        worst = worst[np.lexsort((place.line[worst], place.file[worst]))]
+        lines = ", ".join(visits.list_lines(worst, place.file[first]))
         text = (
             f"the approach direction of {len(rows)} targets is uncertain, because an "
             f"axis reversed shortly before (up to +-{size[rows].max():.3f} mm, for "
@@ -329,8 +336,8 @@ def report_uncertain_sides(
         )
         return [
             Diagnostic(
-                visits.files[0],
-                int(visits.place.line[rows[0]]),
+                visits.file_name(first),
+                int(place.line[first]),
                 Code.DIRECTION_UNCERTAIN,
                 text,
             )

@@ -225,7 +225,7 @@ class InTime:
         if not len(slowed):
             return
         rows = self.source(slowed)
-        lines = dict.fromkeys(visits.place.line[rows].tolist())
+        lines = visits.list_lines(rows, visits.place.file[rows[0]])
         more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
         worst = slowed[self.after.clock.allowed[slowed].argmin()]
         least = 100 * self.after.clock.allowed[worst]
@@ -234,7 +234,7 @@ class InTime:
             f"the joints reach {least:.0f} % of the programmed speed at the least, "
             f"where axis {joint} is nearest to its limit: the controller slows down "
             "or stops there, usually near a singularity "
-            f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
+            f"(lines {', '.join(lines[:FEW])}{more})"
         )
         place = (
             visits.file_name(rows[0]),

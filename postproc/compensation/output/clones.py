@@ -174,8 +174,34 @@ def with_lines_of(
     has = np.flatnonzero(v.target.literal >= 0)
     line = np.zeros(len(w.literals), dtype=np.int64)
     line[w.target.literal[has]] = v.literals.line[v.target.literal[has]]
-    own = w.with_columns(line=v.place.line)
-    return replace(own, literals=replace(w.literals, line=line))
+    own = _with_reasons_of(v, w.with_columns(line=v.place.line))
+    pinned = _pins_of(v, w, has)
+    return replace(own, literals=replace(w.literals, line=line, pinned=pinned))
+
+
+def _with_reasons_of(before: Visits, after: Visits) -> Visits:
+    """Give visits that still keep their numbers for a reason its text of before.
+
+    A text may name a line.
+    """
+    codes = [np.array([one.code for one in v.reasons]) for v in (before, after)]
+    same = codes[0][before.reason] == codes[1][after.reason]
+    still = same & (before.reason > 0) & (after.reason > 0)
+    reason = np.where(still, len(after.reasons) + before.reason, after.reason)
+    reasons = (*after.reasons, *before.reasons)
+    return replace(after, reason=reason, reasons=reasons)
+
+
+def _pins_of(before: Visits, after: Visits, rows: Ints) -> tuple[str, ...]:
+    """Return why literals are pinned, in the words of before, for rows with one."""
+    pinned = list(after.literals.pinned)
+    for old, new in zip(
+        before.target.literal[rows].tolist(),
+        after.target.literal[rows].tolist(),
+        strict=True,
+    ):
+        pinned[new] = pinned[new] and (before.literals.pinned[old] or pinned[new])
+    return tuple(pinned)
 
 
 def _origin(

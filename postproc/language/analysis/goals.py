@@ -246,7 +246,7 @@ class GoalReader(ABC):
     def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
         """Return the goal of a move that names data, and elements of them."""
         declared = self.task.datum(name, self.here)
-        shared = declared is not None and declared[1].scope == "global"
+        shared = declared is not None and self.task.is_exported(declared[1])
         pins = self.explain_pinned(name, goal.point)
         return replace(goal, name=name + steps, pins=pins, shared=shared)
 

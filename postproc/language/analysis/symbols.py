@@ -147,6 +147,10 @@ class TaskSymbols(ABC, Generic[F]):
     def outlives(self, datum: Datum) -> bool:
         """Return True if what data are given is there when the task runs again."""
 
+    def is_exported(self, datum: Datum) -> bool:
+        """Return True if other programs may go to a point, too."""
+        return datum.scope == "global"
+
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
         """Return True if nothing but assignments on the way changes data."""
         return not (name in self.uses.changed or name in self.volatile)

@@ -710,7 +710,7 @@ class TaskMachine(BlockMachine[Arrived]):
 
         Those are all routines but procedures, handlers, and what the language says.
         """
-        for file, text in enumerate(self.texts):
+        for file, text in enumerate(one.text for one in self.task.files):
             for routine in self.task.routines_by_file.get(file, ()):
                 if routine.key in self.task.dead:
                     continue

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import ClassVar
 
 from postproc.files import FolderListing, base_name, find_beside, read_if_readable
 from postproc.language.file_name import FileName, Named, Skip
 
 SHARED_LIST, ARCHIVE_DEPTH = "$config.dat", 4
+OTHER_PROGRAMS = "PROGRAMS/"
+USER_SOURCES = ("user_grp.src", "userspot.src")
 # Sources of a controller and its packages, and routines that tell them from others.
 _SYSTEM_SOURCES = {
     "bas": ("bas", "initmov", "frames"),
@@ -99,16 +101,24 @@ class KrlFileName(FileName):
         folder = Path(self.place).absolute().parent
         if not self.is_program or not folder.is_dir():
             return ()
-        found = _find_shared_list(folder, listing)
-        submits: list[Path] = []
-        if found is not None and found.parent.name.lower() == "system":
-            submits += listing.ending(found.parent.parent, self.background, below=True)
-        for place in dict.fromkeys(
-            [folder] if found is None else [found.parent, folder]
-        ):
-            submits += listing.ending(place, self.background)
-        names = {path.name.lower(): path for path in submits}
-        return (*(() if found is None else (found,)), *names.values())
+        found = find_shared_list(folder, listing)
+        submits = find_in_archive(folder, self.background, listing)
+        return (*(() if found is None else (found,)), *submits)
+
+    def name_for(self, program: PurePath) -> str:
+        """Return its name in a job; other programs have one with a folder.
+
+        >>> KrlFileName("b.src").name_for(PurePath("a.src"))
+        'PROGRAMS/b.src'
+        """
+        path = PurePath(self.place)
+        apart = not (self.is_shared or path.name.lower() in USER_SOURCES)
+        return f"{OTHER_PROGRAMS}{path.name}" if apart else path.name
+
+    @property
+    def is_from_elsewhere(self) -> bool:
+        """Tell whether it is the name of another program that changes shared data."""
+        return self.place.startswith(OTHER_PROGRAMS)
 
 
 FILES = KrlFileName
@@ -124,7 +134,23 @@ def _find_calls(text: bytes) -> Iterator[re.Match[bytes]]:
         at = text.find(b"(", end)
 
 
-def _find_shared_list(folder: Path, listing: FolderListing) -> Path | None:
+def find_in_archive(
+    folder: Path, suffixes: tuple[str, ...], listing: FolderListing
+) -> tuple[Path, ...]:
+    """Find files by their suffixes: of a folder, and of the archive that it is in.
+
+    One of several of a name is found, that of the folder before others.
+    """
+    found = find_shared_list(folder, listing)
+    paths: list[Path] = []
+    if found is not None and found.parent.name.lower() == "system":
+        paths += listing.ending(found.parent.parent, suffixes, below=True)
+    for place in dict.fromkeys([folder] if found is None else [found.parent, folder]):
+        paths += listing.ending(place, suffixes)
+    return tuple({path.name.lower(): path for path in paths}.values())
+
+
+def find_shared_list(folder: Path, listing: FolderListing) -> Path | None:
     """Find ``$config.dat``: beside a source, or where a controller keeps it.
 
     In an archive programs stand in ``R1/Program``, at any depth, and the list in
@@ -146,7 +172,7 @@ def _name_lists(path: Path, text: bytes) -> Named:
              if KrlFileName(other.name).is_data_list
              and other.stem.lower() != path.stem.lower()
              and other.is_file() and not other.is_symlink()]  # fmt: skip
-    public = [(list_.program, _points_for_all(list_, at.st_mtime_ns, at.st_size))
+    public = [(list_, _points_for_all(list_, at.st_mtime_ns, at.st_size))
               for list_, at in lists]  # fmt: skip
     if not any(points for _, points in public):
         return {}
@@ -157,8 +183,9 @@ def _name_lists(path: Path, text: bytes) -> Named:
     for other, points in public:
         places = [lines[name] for name in points & lines.keys()]
         if places:
+            own = find_beside(Path(other.place), Path(other.program).name)
             line = text.count(b"\n", 0, min(places)) + 1
-            found[KrlFileName(other).key] = line
+            found[KrlFileName(str(own or other.place)).key] = line
     return found
 
 
@@ -166,7 +193,8 @@ def _name_lists(path: Path, text: bytes) -> Named:
 def _points_for_all(file: KrlFileName, changed: int, size: int) -> frozenset[bytes]:
     """Return the points that a list declares for all programs, in lower case.
 
-    A list whose source moves belongs to that source, whoever else names its points.
+    A list whose source moves belongs to that source, whoever else names its points. A
+    list needs no source.
     """
     place = Path(file.place)
     text = read_if_readable(place)
@@ -174,5 +202,5 @@ def _points_for_all(file: KrlFileName, changed: int, size: int) -> frozenset[byt
         return frozenset()
     names = frozenset(name.lower() for name in _SHARED_POINT.findall(text))
     own = find_beside(place, Path(file.program).name) if names else None
-    moves = own is None or _MOVE.search(read_if_readable(own)) is not None
+    moves = own is not None and _MOVE.search(read_if_readable(own)) is not None
     return frozenset() if moves else names

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -161,7 +161,7 @@ class KrlMachine(TaskMachine):
     def _has_interrupts(self) -> bool:
         """Return True if interrupts or triggers may call routines."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for text in self.texts for one in text.said.said)
+        said_ones = (one for file in self.task.files for one in file.text.said.said)
         return any(isinstance(one, kinds) for one in said_ones)
 
     # What it does.
@@ -311,7 +311,7 @@ class KrlMachine(TaskMachine):
             self._begin_early(_RESUMED, here)
             return here.blocking(_RESUMED)
         if effects:
-            moves = _INTERRUPT if MOVES in effects else _RESUMED
+            moves = self._moving(at, one.action) if MOVES in effects else _RESUMED
             own = number, _ENDED if ends else moves
             here = here.setting(declared=others | {own})
             if not self._find_routines(("on",), {number, EVERY}):  # nothing does
@@ -336,10 +336,10 @@ class KrlMachine(TaskMachine):
     def _interrupts(self) -> list[_InterruptStatement]:
         """List all that programs say of interrupts, but for submit programs."""
         found, kinds = [], said.InterruptDeclared | said.InterruptSwitched
-        for file, text in enumerate(self.texts):
-            if self.task.files[file].is_submit:
+        for file, own in enumerate(self.task.files):
+            if own.is_submit:
                 continue
-            here = Scope(file, self.task.files[file].name, "")
+            text, here = own.text, Scope(file, own.name, "")
             for row in text.of_kind(lambda one: isinstance(one, kinds)):
                 one, around = text.statement(row), self.task.routine_around(file, row)
                 word = "decl" if isinstance(one, said.InterruptDeclared) else one.word
@@ -451,7 +451,15 @@ class KrlMachine(TaskMachine):
         if not self.effects_of(one.action, at.place.scope):
             return here
         self._call_beside(one.action)
-        return here.blocking(_INTERRUPT)
+        return here.blocking(self._moving(at, one.action))
+
+    def _moving(self, at: At, action: ir.SourceStatement) -> Reason:
+        """Say which interrupt or trigger may move the arm, and what it calls."""
+        file = self.texts[at.place.scope.file]
+        names = sorted({name.upper() for name in self.names_called(action)})
+        calls = f" calls {' and '.join(names)}" if names else ""
+        where = f"line {file.line(at.row)} of {file.source.name}"
+        return replace(_INTERRUPT, text=f"{_INTERRUPT.text}: {where}{calls}")
 
     def _call_beside(self, action: ir.SourceStatement) -> None:
         """Note the routines that an interrupt or a trigger calls."""

@@ -15,11 +15,13 @@ from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
+from postproc.language.krl.other_programs import changing_programs
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.krl.to_visits import KrlCollector
 from postproc.language.krl.user_sources import acting_sources
+from postproc.language.text.source import Source
 
 # Switches of the controller's own accuracy model, and the words that switch it off.
 _ACCURACY = {
@@ -65,6 +67,10 @@ class Krl(TaskLanguage):
         """Name the first routine, and what a file is called."""
         return f"DEF {files[0].routines[0].head.name}", "program"
 
+    def is_beside(self, source: Source) -> bool:
+        """Return True for another program, or its list, that changes shared data."""
+        return KrlFileName(source.name).is_from_elsewhere
+
     def refuse(self, files: Sequence[KrlFile]) -> None:
         """Refuse submit programs, the controller's own accuracy and second values."""
         if files[0].is_submit:
@@ -75,11 +81,15 @@ class Krl(TaskLanguage):
         _refuse_doubles(files)
 
     def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
-        """Return what all share, and sources of packages that people wrote moves in."""
+        """Return what all share, and what others may move or change of it.
+
+        Sources of packages that people wrote moves in, and other programs.
+        """
         named = KrlFileName(str(program))
         if not named.is_program:
             return ()
-        return (*named.find_shared(listing), *acting_sources(program, listing))
+        shared = (*named.find_shared(listing), *acting_sources(program, listing))
+        return (*shared, *changing_programs(program, listing))
 
     read_archive = staticmethod(read_archive)
 

@@ -69,8 +69,8 @@ NO_STATUS = Reason(
     "a PTP without S and T: the controller chooses the configuration",
 )
 ACCURATE = Reason(
-    Code.SETTING_UNTRACKED,
-    "S says that it was taught with the controller's own accuracy model",
+    Code.ACCURATE_POINT,
+    "S says that it was taught with the controller's own accuracy model (bit 4)",
 )
 NOT_BY_JOINTS = Reason(
     Code.TRAJECTORY_UNKNOWN, "the target is joint angles, and the move to it is no PTP"

@@ -75,7 +75,7 @@ def read_krl(source: Source) -> KrlFile:
                 splines += [range(begin, row)] if ends and begin >= 0 else []
                 begin = -1 if ends else row
             case ir.Assignment(target=target, value=value):
-                index = _index(text, row, target.steps)
+                index = literal_index(text, row, target.steps)
                 if outline.name("defdat") and index is not None:
                     own = Datum(target.name, "", row, name, "", value, index)
                     outline.data.append(own)
@@ -90,7 +90,7 @@ def read_krl(source: Source) -> KrlFile:
     return replace(found, routines=(first, *others))
 
 
-def _index(
+def literal_index(
     text: StatementText[ir.SourceStatement],
     row: int,
     steps: Sequence[str | ir.ElementStep],

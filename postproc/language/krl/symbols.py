@@ -23,6 +23,11 @@ from postproc.language.analysis.values import KnownRecord, Layout, Value, Writte
 from postproc.language.krl import syntax as said
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
+from postproc.language.krl.shared_changes import (
+    SharedChange,
+    list_imports,
+    list_shared_changes,
+)
 from postproc.language.shifts import Pose, Shift, ShiftKind
 from postproc.language.text.symbol_column import read_names
 
@@ -118,8 +123,30 @@ class KrlTask(TaskSymbols[KrlFile]):
         return _KrlUses(self.routines, self.called_elsewhere, points=self._points)
 
     def shares(self, file: int, datum: Datum) -> bool:
-        """Return True for GLOBAL data, and those of ``$config.dat``."""
-        return datum.scope == "global" or datum.module == CONFIG
+        """Return True for GLOBAL data, those of ``$config.dat``, and imported ones."""
+        return datum.module == CONFIG or self.is_exported(datum)
+
+    def is_exported(self, datum: Datum) -> bool:
+        """Return True for GLOBAL data, and those that other programs import."""
+        imported = (datum.module, datum.name) in self._imported
+        return super().is_exported(datum) or imported
+
+    @cached_property
+    def _imported(self) -> frozenset[tuple[str, str]]:
+        """Lists and names of data that other programs import."""
+        found = list_imports(self.files_beside)
+        return frozenset((one.module, one.original) for one in found)
+
+    @cached_property
+    def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
+        """What other programs change of the data that all share, by name."""
+        data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        shared = HELD.union(one.name for k, one in data if self.shares(k, one))
+        found = dict[str, list[SharedChange]]()
+        for one in list_shared_changes(self.files_beside, self.new_uses):
+            if one.name in shared:
+                found.setdefault(one.name, []).append(one)
+        return found
 
     def outlives(self, datum: Datum) -> bool:
         """Return True for data of a list."""
@@ -165,6 +192,10 @@ class KrlTask(TaskSymbols[KrlFile]):
         if self.place(name, here) is None:
             text = "is declared in none of the given files, or in several of them"
             return Code.UNDECLARED_VARIABLE, text
+        if others := self.changed_elsewhere.get(name):
+            where = f"{others[0].file} (line {others[0].line})"
+            text = f"may be changed by {where}: set it before the moves that take it"
+            return code, text
         if name in self.written:
             text = "may be changed by the program: it is known only when that runs"
             return code, text
@@ -218,6 +249,8 @@ class KrlTask(TaskSymbols[KrlFile]):
         found: dict[str, set[tuple[int, ...]]] = {name: set() for name in arrays}
         for name in (self.odd_words | self.called_beside) & arrays:
             found[name].add(ANY)
+        for name in arrays & self.changed_elsewhere.keys():
+            found[name] |= {one.index or ANY for one in self.changed_elsewhere[name]}
         for number, file in enumerate(self.files):
             there = Scope(number, "", "")
             for row in file.text.of_kind(lambda one: bool(self.list_changes(one))):
@@ -344,6 +377,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     def note_odd(self, uses: NamesUsed) -> None:
         """Note what submit programs and what is not understood may do."""
         uses.changed |= self.beside | self.odd_words
+        uses.written |= self.changed_elsewhere.keys()
         uses.read |= self.beside.union(*(part.read for part in self._beside))
         uses.read |= self.words_of_odd()
 

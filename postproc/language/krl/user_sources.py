@@ -7,13 +7,12 @@ from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_input
-from postproc.language.krl.files import ARCHIVE_DEPTH, KrlFileName
+from postproc.language.krl.files import ARCHIVE_DEPTH, USER_SOURCES, KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import read_krl
 from postproc.language.krl.symbols import KrlTask
 from postproc.language.text.source import source_from_bytes
 
-USER_SOURCES = ("user_grp.src", "userspot.src")
 FOLDERS = ("System", "TP", "Program")  # of an archive
 READ_BEFORE = 64  # sources of which is known what they do
 

@@ -260,10 +260,12 @@ class ErrorHandlers:
     Attributes:
         clauses: Its error handlers.
         moves: They may move the arm, or change how moves are carried out.
+        sets: They may do the latter.
     """
 
     clauses: tuple[ErrorClause, ...] = ()
     moves: bool = False
+    sets: bool = False
 
 
 @dataclass(frozen=True)
@@ -272,7 +274,7 @@ class ErrorExit:
 
     Attributes:
         numbers: The errors.
-        lost: A handler on the way may have moved the arm or changed modes.
+        moves, sets: What a handler on the way may have done, as `ErrorHandlers`.
         at: The statement, None where a cycle ends. Of the routine's own handler the row
             is counted from the statement that raises the error.
         restarts: The cycle ends and main begins again from where the arm stands.
@@ -280,7 +282,8 @@ class ErrorExit:
     """
 
     numbers: Numbers
-    lost: bool
+    moves: bool
+    sets: bool
     at: At | None
     restarts: bool
     own: bool
@@ -310,17 +313,17 @@ def exits_of(
         context: Where the statement stands.
         handlers: What handles the errors of a routine.
     """
-    numbers, lost = ANY, False
+    numbers, moves, sets = ANY, False, False
     at: At | None = At(context, 0)
     while at is not None:
         here, raised = handlers(at.context), NO_NUMBERS
-        lost = lost or here.moves
+        moves, sets = moves or here.moves, sets or here.sets
         for number, end in _list_ends(here, numbers):
             if end == "raise":
                 raised = together(raised, number)
             else:
                 own, to = at.context is context, _find_exit(at, end)
-                yield ErrorExit(number, lost, to, end == EXIT_CYCLE, own)
+                yield ErrorExit(number, moves, sets, to, end == EXIT_CYCLE, own)
         if not all(clause.listed for clause in here.clauses):
             numbers = raised
         at = caller_of(at.context)

@@ -150,8 +150,24 @@ class RapidMachine(TaskMachine):
     def at_return(self, context: Context, here: Arrived) -> Arrived:
         """Note the end of a cycle; forget what a handler may have changed."""
         if context.outer is self.root:
-            self.ends.append(here)
-        return here.forget() if self._handlers_of(context).moves else here
+            self.ends.append(self._end_blocking(None, here))
+        handlers = self._handlers_of(context)
+        if not handlers.moves:
+            return here
+        return self._end_blocking(context.outer, _after(handlers, here))
+
+    def _end_blocking(self, context: Context | None, here: Arrived) -> Arrived:
+        """Return it where the program goes on in a routine, None for the next cycle.
+
+        A handler acts while its routine, or one that this calls, runs; but that of a
+        process error may act on a move behind which the routine has ended.
+        """
+        around = (one for one in context.around() if one.place) if context else ()
+        acts = "procerrrecovery" in self.task.find_calls or any(
+            self._handlers_of(one).moves for one in around
+        )
+        blocked = here.modes.blocked - {_HANDLER}
+        return here if acts else here.setting(blocked=blocked)
 
     # Errors.
 
@@ -169,9 +185,12 @@ class RapidMachine(TaskMachine):
             clauses = errors.HandlerReader(text, read).clauses(place.flow)
             rows = place.flow.handlers
             effects, called = self.read_rows(scope, rows, (errors.EXIT_CYCLE,))
-            if moves := bool(effects.union(*map(self.routine_effects, called))):
+            inner = frozenset().union(*map(self.routine_effects, called))
+            if moves := bool(effects | inner):
                 self.beside.add((scope.file, rows.start, rows.stop))
-            self._handlers[key] = errors.ErrorHandlers(clauses, moves)
+            but = errors.EXIT_CYCLE, *(MOTIONS.keys() - {*SYNCHRONOUS})
+            sets = bool(self.read_rows(scope, rows, but)[0] | inner)
+            self._handlers[key] = errors.ErrorHandlers(clauses, moves, sets)
         return self._handlers[key]
 
     def _exits_of(self, context: Context) -> tuple[errors.ErrorExit, ...]:
@@ -210,8 +229,10 @@ class RapidMachine(TaskMachine):
 
     def _handle(self, at: At, way: errors.ErrorExit, here: Arrived) -> None:
         """Go on behind an error."""
-        here = here.forget() if way.lost else here
+        here = _after(way, here)
         to = way.beside(at) or way.at
+        if not way.own:
+            here = self._end_blocking(to and to.context, here)
         if to is not None:
             self.go_on(to, here)
         elif way.restarts:
@@ -411,6 +432,13 @@ _HANDLER = Reason(
     Code.BESIDE_PROGRAM,
     "the error handler of its routine may move the arm, or change its settings",
 )
+
+
+def _after(one: errors.ErrorHandlers | errors.ErrorExit, here: Arrived) -> Arrived:
+    """Forget what handlers may have changed."""
+    if one.sets:
+        return here.forget()
+    return here.elsewhere() if one.moves else here
 
 
 def _is_text(operand: ir.Operand | None) -> TypeGuard[ir.StringLiteral]:

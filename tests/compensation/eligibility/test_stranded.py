@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from postproc.compensation.eligibility.configuration_flags import STOPPED, STRANDED
+from postproc.compensation.eligibility.configuration_flags import (
+    STOPPED,
+    STRANDED,
+    mark_stranded,
+)
 from postproc.compensation.program import PlannedProgram, plan_visits, read_program
+from postproc.motion.targets import CODE, PATH_JUMP, PATH_LIMITS, PATH_REACH
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
 
@@ -76,6 +82,23 @@ def test_behind_an_axis_that_leaves_its_range_on_the_way(cell, pos):
     found = planned(cell, far, START)
     assert found.reasons[1].text.startswith("axis 1 would be beyond its limit")
     assert stranded(found) == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("cause", "named"),
+    [(PATH_LIMITS[1], "axis 2"), (PATH_REACH, "reach"), (PATH_JUMP, "singularity")],
+)
+def test_a_broken_path_is_named_and_not_its_target(cell, pos, cause, named):
+    lines = [f"MOVE LINEAR TO {pos(at)}" for at in (HERE, THERE)]
+    text = "\n".join(["PROGRAM job", "BEGIN", START, *lines, START, "END job"])
+    visits = read_program({"job.pdl": text.encode()}, cell).visits
+    found = plan_visits(visits, cell)
+    assert found.reasons.none.all()
+    plan = replace(found.plan, reason=np.array([0, CODE[cause], 0, 0]))
+    why = mark_stranded(visits, found.targets, plan, found.reasons)
+    assert named in found.reasons[2].text and "on the way" in found.reasons[2].text
+    part = plan_visits(visits, cell, doubtful=int(why[1]))  # which begins behind it
+    assert part.reasons[1] == found.reasons[2] and found.reasons.none[3] == (not why[2])
 
 
 def test_a_step_goes_on_from_nowhere_until_a_place_is_named(cell, pos):

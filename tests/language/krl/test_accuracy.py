@@ -2,6 +2,7 @@
 
 import pytest
 
+from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from tests.language.krl.test_visits import CONFIG, codes, job, reasons
 
@@ -30,3 +31,8 @@ def test_what_a_list_switches_on_is_refused_too():
     config = CONFIG.replace("ENDDAT", "$DEACTIVATE_ABS_ACCUR=FALSE\nENDDAT")
     with pytest.raises(ProgramError, match=r"\$config\.dat:\d+: .*on its own"):
         job("LIN XP1", config=config)
+
+
+def test_a_point_of_the_model_has_a_cure_of_its_own():
+    found = job("LIN {X 1,Y 2,Z 3,A 0,B 0,C 0,S 18,T 2}").visits
+    assert found.reasons[found.reason[0]].code is Code.ACCURATE_POINT

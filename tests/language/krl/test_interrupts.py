@@ -234,3 +234,8 @@ def test_a_routine_of_the_files_comes_before_one_of_a_package():
         [0],
         [1],
     ]
+
+
+def test_what_moves_beside_is_named_with_its_line():
+    found = job("LIN XP1", "TRIGGER WHEN DISTANCE=1 DELAY=0 DO glue( )", "LIN XP2")
+    assert reasons(found)[-1].endswith(": line 4 of m.src calls GLUE")

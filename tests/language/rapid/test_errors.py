@@ -162,3 +162,41 @@ def test_a_handler_in_a_block_is_read_to_its_end():
 def test_a_loop_that_ends_behind_a_handler_is_followed():
     loop = ("FOR k FROM 1 TO 2 DO", L.format("p1"), "ERROR", "TRYNEXT;", "ENDFOR")
     assert len(task(*loop).visits) == 1
+
+
+P1, P2, P3 = (L.format(f"list{{{k}}}") for k in (1, 2, 3))
+HANDLED = "the error handler of its routine"
+
+
+def moved(*handler, main=(), more=""):
+    """Read a job that calls a routine with a handler, and moves behind the call."""
+    body = sub(P1, "ERROR", *handler, "RETRY;")
+    return task(L.format("p1"), "sub;", L.format("p2"), *main, more=MORE + body + more)
+
+
+def test_a_handler_that_moves_acts_in_its_routine_alone():
+    found = moved(P2)
+    assert [HANDLED in why for why in reasons(found)] == [False, True, False]
+    assert at_end(found) == (True, "")
+
+
+def test_what_a_handler_may_set_is_unknown_behind_its_routine():
+    assert "displacement" in at_end(moved(P2, "PDispSet d;"))[1]
+    again = moved(P2, "PDispSet d;", main=("PDispOff;", L.format("p2")))
+    assert "displacement" not in reasons(again)[-1]
+
+
+def test_a_handler_acts_in_routines_that_its_own_calls():
+    found = moved("TRYNEXT;", main=("EXIT;", "ERROR", P2, "RETRY;"))
+    assert all(HANDLED in why for why in reasons(found))
+
+
+def test_an_error_that_leaves_a_routine_leaves_its_handler():
+    body = sub(P1, "ERROR", P2, "RAISE;")
+    found = task("sub;", L.format("p2"), "EXIT;", "ERROR", "TRYNEXT;", more=MORE + body)
+    assert HANDLED not in reasons(found)[-1]
+
+
+def test_a_process_error_acts_behind_its_routine():
+    found = moved(P2, main=(r"ProcerrRecovery \SyncLastMoveInst;",))
+    assert HANDLED in reasons(found)[-1]
