@@ -2,9 +2,13 @@
 
     python -m tests.bench.languages [--targets 20000] [--rounds 3]
     python -m tests.bench.languages --files [--targets 1000000]
+    python -m tests.bench.languages --named [--targets 20000]
 
 The same moves in the same cell, one process, without cycle times. Languages take
 turns; the fastest round of each counts.
+
+`--named`: the time to read them where every target is a point of its own name, declared
+in the module (RAPID), in the data list (KRL) or in the variable file (PDL2).
 
 `--files`: from files to written output and reports, by as many processes as there are
 cores. The moves are one fly run; those of 20,000 targets are repeated.
@@ -13,6 +17,7 @@ cores. The moves are one fly run; those of 20,000 targets are repeated.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import re
 import shutil
@@ -110,6 +115,81 @@ def table(found: Mapping[str, dict[str, float]]) -> list[str]:
     return rows
 
 
+# The same job with named points.
+
+RAPID_TARGET = re.compile(r"MoveL (\[\[.*?9E9\]\]),")
+KRL_TARGET = re.compile(r"SLIN (\{.*?\}) C_SPL")
+PDL2_TARGET = re.compile(r"LINEAR TO POS\((.*?), '(.*?)'\)")
+
+
+def with_names(texts: Mapping[str, Mapping[str, bytes]]) -> dict[str, dict[str, bytes]]:
+    """Give every target of lines a name of its own, in every language."""
+    own = {name: files[name].decode() for name, files in texts.items()}
+    points = RAPID_TARGET.findall(own["job.mod"])
+    declared = [f"  CONST robtarget p{k}:={p};" for k, p in enumerate(points)]
+    rapid = _numbered(RAPID_TARGET, "MoveL p{},", own["job.mod"])
+    main = "\n".join([*declared, "  PROC main()"])
+    points = KRL_TARGET.findall(own["job.src"])
+    listed = [f"DECL E6POS XP{k}={p}" for k, p in enumerate(points)]
+    listed = ["&ACCESS RVP", "DEFDAT job", *listed, "ENDDAT", ""]
+    entries = [_entry(k, *p) for k, p in enumerate(PDL2_TARGET.findall(own["job.pdl"]))]
+    names = [f"  p{k} : POSITION" for k in range(len(entries))]
+    pdl2 = _numbered(PDL2_TARGET, "LINEAR TO p{}", own["job.pdl"])
+    begin = "\n".join(["VAR", *names, "BEGIN"])
+    made = {
+        "job.pdl": {"job.pdl": pdl2.replace("BEGIN", begin, 1),
+                    "job.lsv": "".join(entries)},
+        "job.mod": {"job.mod": rapid.replace("  PROC main()", main, 1)},
+        "job.src": {"job.src": _numbered(KRL_TARGET, "SLIN XP{} C_SPL", own["job.src"]),
+                    "job.dat": "\r\n".join(listed)},
+    }  # fmt: skip
+    return {
+        name: {page: text.encode() for page, text in files.items()}
+        for name, files in made.items()
+    }
+
+
+def _numbered(target: re.Pattern[str], named: str, text: str) -> str:
+    """Replace targets by names with numbers."""
+    count = itertools.count()
+    return target.sub(lambda _: named.format(next(count)), text)
+
+
+def _entry(k: int, numbers: str, flags: str) -> str:
+    """Write a point as an entry of a variable file."""
+    x, y, z, a, e, r = numbers.split(", ")
+    return (f"p{k} POS Priv\n X: {x}  Y: {y}  Z: {z}  A: {a}  E: {e}  R: {r}\n"
+            f" CNFG: '{flags}'\n")  # fmt: skip
+
+
+def read_named(targets: int = 20_000, rounds: int = 3) -> list[str]:
+    """Read one job of named points in every language in turn, and write the table."""
+    with TemporaryDirectory() as folder:
+        cell, _ = fitted(ARM, Path(folder))
+    inline = written(milled(cell, targets))
+    rows = [
+        "| language | in the moves, us a target | named | of PDL2's |",
+        "|---|---|---|---|",
+    ]
+    base = 0.0
+    for name, files in with_names(inline).items():
+        one, two = (_seconds_to_read(f, cell, rounds) for f in (inline[name], files))
+        base = base or two
+        cells = [f"{1e6 * own / targets:.1f}" for own in (one, two)]
+        rows.append(f"| {NAMES[name]} | {' | '.join(cells)} | {two / base:.1f} |")
+    return rows
+
+
+def _seconds_to_read(files: Mapping[str, bytes], cell: Cell, rounds: int) -> float:
+    """Return the processor time of the fastest round [s]."""
+    best = np.inf
+    for _ in range(rounds):
+        begin = time.process_time()
+        read_program(files, cell)
+        best = min(best, time.process_time() - begin)
+    return float(best)
+
+
 FLY = re.compile(rb"^ *(MOVEFLY LINEAR TO POS|MoveL|SLIN) ?[({\[].*$", re.M)
 
 
@@ -183,7 +263,11 @@ def main() -> None:
     parser.add_argument("--targets", type=int, default=20_000)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--files", action="store_true")
+    parser.add_argument("--named", action="store_true")
     asked = parser.parse_args()
+    if asked.named:
+        print("\n".join(read_named(asked.targets, asked.rounds)))
+        return
     if asked.files:
         print("\n".join(files_table(measure_files(asked.targets))))
         return
