@@ -26,6 +26,7 @@ STATUSES = ("safe", "unsafe", "display", "guarded", "unchanged")  # as it named 
 SUFFIX, LOG = ".postproc.json", "dst.batch.jsonl"
 CHANGED = (
     "abb/taught/job.mod",  # whose comment TAUGHT holds for its statement since
+    "abb/search/job.mod",  # which goes on with ConfL Off where the search ended
     "abb/shared/job.mod",  # whose arrivals have one correction since
     "pdl/line001/weld.pdl",
 )

@@ -11,6 +11,7 @@ from postproc.diagnostics import NO_REASON, Reason
 class Reasons:
     """The first reason given for each of n visits.
 
+    >>> from postproc.diagnostics import Code
     >>> reasons = Reasons(3)
     >>> far = Reason(Code.OUT_OF_REACH, "out of reach")
     >>> wrist = Reason(Code.SINGULAR_WRIST, "at the wrist singularity")
