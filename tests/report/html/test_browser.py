@@ -217,6 +217,7 @@ def test_a_click_into_the_view_leads_to_the_row(program: Any) -> None:
 
 def test_links_of_what_was_left_alone_lead_to_it(program: Any) -> None:
     click(program, "#left a")
+    until(program, "return !!document.querySelector('#targets tr.selected');")
     selected = program.find_element("css selector", "#targets tr.selected")
     assert "conflict" in selected.text
 
