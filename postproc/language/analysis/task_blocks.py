@@ -291,7 +291,7 @@ class BlockMachine(Interpreter[S]):
         if marked or reader.explain_pinned(name, slot):
             return ALONE, 0
         of_all = found if not apart else task.datum(name, scope)
-        shared = of_all is not None and of_all[1].scope == "global"
+        shared = of_all is not None and task.is_exported(of_all[1])
         if id(target) not in self._near:
             alike = target.relative()
             self._near[id(target)] = self._alike.setdefault(alike, alike)

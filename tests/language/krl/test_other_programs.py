@@ -71,6 +71,17 @@ def test_imported_points_are_shared(change):
     assert not read(FRAMES, change).visits.literals.shared.any()
 
 
+@pytest.mark.parametrize("imported", [1, 2, 4])
+def test_one_of_a_block_of_points_is_imported(imported):
+    point = "DECL E6POS XP{0}={{X {0},Y 0,Z 0,A 0,B 0,C 0,S 2,T 35}}"
+    data = "\n".join(point.format(k) for k in range(1, 9))
+    lines = [*FRAMES[:2], *(f"LIN XP{k}" for k in range(1, 9))]
+    source = f"IMPORT E6POS XQ IS /R1/m..XP{imported}"
+    found = read(lines, "LIN XQ", source, data).visits
+    shared = found.literals.shared[found.target.literal].tolist()
+    assert shared == [k == imported for k in range(1, 9)]
+
+
 OTHERS = {
     "frame": ({"o.src": "BASE_DATA[2].X=5"}, ["o.src"]),
     "frame of bas": ({"o.src": "BASE_CORR_ON=TRUE"}, ["o.src"]),
