@@ -1,4 +1,4 @@
-"""Why targets keep their values, whatever the model says of them."""
+"""Why targets keep their values, even where the model can correct them."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What is said of a compensated program beside its numbers."""
+"""Findings about a compensated program: messages, headline, tolerance, times."""

@@ -1,4 +1,4 @@
-"""What came of the targets on every line: kept beside an output, told by `diff`."""
+"""What came of the targets on every line: kept beside an output, read by `diff`."""
 
 from __future__ import annotations
 

@@ -184,6 +184,11 @@ class InsertionTask:
         paths = self.first.paths
         return deviations_of(paths, np.arange(len(paths)))
 
+    @cached_property
+    def sizes(self) -> dict[int, float]:
+        """Return how far each move leaves its path without points, at the most [m]."""
+        return {v: one.largest for v, one in self.deviations.items()}
+
     @property
     def tolerance(self) -> float:
         """The largest deviation that is asked for [m]."""

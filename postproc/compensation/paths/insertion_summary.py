@@ -14,7 +14,6 @@ from postproc.compensation.paths.insertion_prediction import (
     PathPrediction,
 )
 from postproc.compensation.paths.insertion_report import Insertions
-from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.plan_outcomes import (
     BEGINS,
     MoveOutcomes,
@@ -76,7 +75,7 @@ def _report_insertions(now: PathPrediction) -> Insertions:
         plan.points,
         plan.stops & plan.points.keys(),
         left,
-        sizes_of(task.first.paths),
+        task.sizes,
         promises,
         find_reapproaches(now),
         plan.unconfirmed,

@@ -228,11 +228,6 @@ def _gather_columns(
     }
 
 
-def sizes_of(paths: PathAccuracy) -> dict[int, float]:
-    """How far each move of the compensated program leaves its path at the most [m]."""
-    return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
-
-
 def deviations_of(paths: PathAccuracy, moves: Ints) -> dict[int, MoveDeviation]:
     """Say how far some moves of the compensated program leave their paths, by visit.
 

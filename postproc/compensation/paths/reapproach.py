@@ -14,7 +14,6 @@ from postproc.compensation.paths.insertion_prediction import (
     InsertionTask,
     PathPrediction,
 )
-from postproc.compensation.paths.path_error import sizes_of
 from postproc.compensation.paths.write_points import numbers_at
 from postproc.compensation.window_result import WindowResult
 from postproc.robot.pose import MM
@@ -53,7 +52,7 @@ def _worse_paths(now: PathPrediction) -> set[int]:
     Only where a path was asked for, and where it is farther off than that.
     """
     task, before = now.task, now.task.visits.graph.before
-    was, far = sizes_of(task.first.paths), now.sizes
+    was, far = task.sizes, now.sizes
     worse = {
         v
         for v, size in far.items()
