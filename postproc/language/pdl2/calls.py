@@ -346,55 +346,42 @@ def _setting(
     here: Execution, reference: ir.DataObject, value: Value, taught: bool
 ) -> None:
     """Change a frame or motion variable of our arm, or one number of a frame."""
-    if (frame := here.frame_part(reference)) is not None:
-        _frame_part(here, *frame, value, taught)
-        return
-    name = here.setting_name(reference)
+    name, component = here.locate_setting(reference)
     if name is None:
-        part = reference.name[1:]
-        if part == "arm_data" and _whose(here, reference) in (None, here.world.arm):
-            part = str((*reference.steps, "")[1]).lstrip("$")
-        part = part if part in DISTURBING else ""
-        off = value is False and here.store.settings.get(part, False) is False
-        if part and not off:
-            here.store.set(**{part: Nothing("a part of it is assigned")})
-        if reference.name[1:] in FRAMES or not reference.steps:
-            said = f"a part of {reference.name.upper()} is assigned"
-            why = said if reference.steps else here.other_default()
-            here.store.set(**{reference.name[1:]: Nothing(why)})
-        elif reference.name == "$arm_data" and _whose(here, reference) is None:
-            field = str((*reference.steps, "")[1]).lstrip("$")
-            here.store.set(**{field: Nothing("it is set for an arm known at run time")})
+        _part_of_setting(here, reference, value)
         return
-    here.world.pin(value, f"${name.upper()} is set to it")
-    if isinstance(value, Position) and name in FRAMES:
-        value = replace(value, slots=(-1,) * 6, along=frozenset())
+    if isinstance(component, int):
+        held = here.find_taught(here.store.settings.get(name, Position()))
+        held = held if isinstance(held, Position) else Position()
+        part = WrittenNumber(value if isinstance(value, float) else math.nan)
+        held = held.with_component(component, part)
+        value = replace(held, taught=held.taught or taught)
+    else:
+        here.world.pin(value, f"${name.upper()} is set to it")
+        if isinstance(value, Position) and name in FRAMES:
+            value = replace(value, slots=(-1,) * 6, along=frozenset())
     if f"${name}" in here.world.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
 
 
-def _frame_part(
-    here: Execution, name: str, at: int, value: Value, taught: bool
-) -> None:
-    """Change one of the six numbers of a frame of our arm."""
-    held = here.find_taught(here.store.settings.get(name, Position()))
-    if not isinstance(held, Position):
-        held = Position()
-    number = WrittenNumber(value if isinstance(value, float) else math.nan)
-    taught = held.taught or taught
-    new: Value = replace(held.with_component(at, number), taught=taught)
-    if f"${name}" in here.world.volatile:
-        new = Nothing("a condition handler changes it")
-    here.store.set(**{name: new})
-
-
-def _whose(here: Execution, reference: ir.DataObject) -> int | None:
-    """Return the arm that ``$ARM_DATA[n]`` names, None where it is not known."""
-    first = reference.steps[0] if reference.steps else None
-    if isinstance(first, ir.ElementStep):
-        return here.integer(first.subscripts[0])
-    return 0
+def _part_of_setting(here: Execution, reference: ir.DataObject, value: Value) -> None:
+    """Forget a setting of which a part is set, or that may be another arm's."""
+    name, steps = reference.name[1:], reference.steps
+    field, arm = name, here.world.arm
+    whose: int | None = arm if name != "arm_data" else 0
+    match reference:
+        case ir.DataObject("$arm_data", (ir.ElementStep((index, *_)), *rest)):
+            field, whose = str((*rest, "")[0]).lstrip("$"), here.integer(index)
+    off = value is False and here.store.settings.get(field, False) is False
+    if whose in (None, arm) and field in DISTURBING and not off:
+        here.store.set(**{field: Nothing("a part of it is assigned")})
+    if name in FRAMES or not steps:
+        said = f"a part of {reference.name.upper()} is assigned"
+        why = said if steps else here.other_default()
+        here.store.set(**{name: Nothing(why)})
+    elif whose is None:
+        here.store.set(**{field: Nothing("it is set for an arm known at run time")})
 
 
 def _with_part(held: Position, component: Component, value: Value) -> Value:

@@ -208,41 +208,34 @@ class Execution:
         return not names.isdisjoint(self.world.volatile)
 
     def _system(self, reference: ir.DataObject) -> Value:
-        part = self.frame_part(reference)
-        name = self.setting_name(reference) if part is None else part[0]
+        name, component = self.locate_setting(reference)
         if name is None or f"${name}" in self.world.volatile:
             return RUN_TIME
         held = self.store.settings.get(name, RUN_TIME)
-        if part is None:
+        if component == ():
             return held
-        number = held.numbers[part[1]] if isinstance(held, Position) else None
-        return RUN_TIME if number is None else number
+        return part_of(held, component) if isinstance(held, Position) else RUN_TIME
 
-    def frame_part(self, reference: ir.DataObject) -> tuple[str, int] | None:
-        """Return our arm's frame and which of its six numbers is meant, else None."""
-        match reference:
-            case ir.DataObject("$arm_data", (of, str(name), str(part))):
-                whole = ir.DataObject("$arm_data", (of, name))
-            case ir.DataObject(name, (str(part),)):
-                whole = ir.DataObject(name, ())
-            case _:
-                return None
-        frame = self.setting_name(whole)
-        known = frame in FRAMES and part in COMPONENTS
-        return (frame, COMPONENTS[part]) if frame and known else None
+    def locate_setting(self, reference: ir.DataObject) -> tuple[str | None, Component]:
+        """Find our arm's setting, and which of the six numbers of a frame is meant.
 
-    def setting_name(self, reference: ir.DataObject) -> str | None:
-        """Return the name of our arm's setting, None for another arm's or none."""
+        Returns:
+            Its name, None for another arm's or none; () for the whole setting.
+        """
         match reference:
-            case ir.DataObject("$arm_data", (ir.ElementStep((index,)), str(name))):
-                if self.is_ours(index):
-                    return name.lstrip("$")
-                return None
-            case ir.DataObject(name, ()):
-                setting = name.lstrip("$")
-                ours = setting in _DEFAULT_ARM or not self.other_default()
-                return setting if ours else None
-        return None
+            case ir.DataObject(
+                "$arm_data", (ir.ElementStep((index,)), str(name), *steps)
+            ):
+                name, ours = name.lstrip("$"), self.is_ours(index) is True
+            case ir.DataObject(name, steps):
+                name = name[1:]
+                ours = name in _DEFAULT_ARM or not self.other_default()
+        match [*steps]:
+            case [] if ours:
+                return name, ()
+            case [str(part)] if ours and name in FRAMES and part in COMPONENTS:
+                return name, COMPONENTS[part]
+        return None, ()
 
     def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
         parts = [self.read_number(item) for item in items]

@@ -191,8 +191,7 @@ def invalidate(here: Execution, reference: ir.DataObject, why: str) -> None:
     if declared is not None and declared.constant:
         return
     if reference.name.startswith("$"):
-        part = here.frame_part(reference)
-        name = here.setting_name(reference) if part is None else part[0]
+        name, _ = here.locate_setting(reference)
         if name in here.store.settings:
             here.store.set(**{str(name): Nothing(why)})
         return

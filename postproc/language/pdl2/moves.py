@@ -213,8 +213,8 @@ def absolute(here: Execution, expression: ir.Operand) -> Pdl2Goal:
 
 def _system(here: Execution, reference: ir.DataObject) -> Pdl2Goal:
     """Tell where a place of the controller is; it belongs to no target."""
-    name = here.setting_name(reference)
-    if name is None:
+    name, component = here.locate_setting(reference)
+    if name is None or component != ():
         last = reference.steps[-1] if reference.steps else reference.name
         said = str(last).lstrip("$").upper() if isinstance(last, str) else "it"
         why = f"${said} belongs to another arm, or only the run tells to which"
@@ -365,13 +365,11 @@ def _with(here: Execution, statement: ast.Move) -> Settings:
     """Return the settings that hold during this move."""
     changes: dict[str, Value] = {}
     for one in statement.settings:
-        reference, expression = one.target, one.value
-        part = here.frame_part(reference)
-        if part is not None:
-            changes[part[0]] = Nothing("a part of it is set for this move alone")
-        name = here.setting_name(reference)
-        if name is not None:
-            changes[name] = here.value(expression)
+        name, component = here.locate_setting(one.target)
+        if name is not None and component != ():
+            changes[name] = Nothing("a part of it is set for this move alone")
+        elif name is not None:
+            changes[name] = here.value(one.value)
             here.world.pin(changes[name], f"${name.upper()} is set to it")
     return {**here.store.settings, **changes} if changes else here.store.settings
 
