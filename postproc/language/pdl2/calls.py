@@ -312,7 +312,7 @@ def assign(here: Execution, statement: ir.Assignment, taught: bool) -> None:
         return
     target = here.locate(reference)
     if target.exact and target.number >= 0:
-        part = here.read_number(new)
+        part = here.number(new)
         held = _position(here, name, target.key).with_component(target.number, part)
         held = replace(held, taught=held.taught or here.takes_taught(new))
         here.store.write(target.key, set_owner(here, name, target.key, held))

@@ -80,12 +80,7 @@ class Execution:
                 return f"${name.upper()} may not be {ours:g}, the arm of the cell, here"
         return ""
 
-    # ---- numbers and places ---------------------------------------------------------
-    def number(self, slot: int) -> float:
-        """Return the value of a number of this line."""
-        lines = self.place.program.lines
-        return float(lines.value[lines.first[self.row] + slot])
-
+    # ---- places ---------------------------------------------------------------------
     def integer(self, expression: ir.Operand) -> int | None:
         """Return a whole number, None where it is not known."""
         value = self.value(expression)
@@ -141,40 +136,81 @@ class Execution:
 
     # ---- reading --------------------------------------------------------------------
     def value(self, expression: ir.Operand | None) -> Value:
-        """Return what an expression is worth."""
+        """Return what an expression is worth to what computes with it.
+
+        A number that a part of a position holds must stay then.
+        """
+        return self._use(self.evaluate(expression))
+
+    def _use(self, found: Value | WrittenNumber) -> Value:
+        if not isinstance(found, WrittenNumber):
+            return found
+        if found.along:
+            self.world.pin_number(found.slot, "the program computes with a part of it")
+        if math.isnan(found.value):
+            return RUN_TIME if found.along else Nothing("the number cannot be read")
+        return found.value
+
+    def real(self, expression: ir.Operand | None) -> float | None:
+        """Return a real number to compute with, None where it is not known."""
+        value = self.value(expression)
+        return value if isinstance(value, float) and math.isfinite(value) else None
+
+    def number(self, expression: ir.Operand | None) -> WrittenNumber:
+        """Return a number, and where in the text it is written or comes from."""
+        found = self.evaluate(expression)
+        if isinstance(found, float) and math.isfinite(found):
+            return WrittenNumber(found)
+        return found if isinstance(found, WrittenNumber) else WrittenNumber(math.nan)
+
+    def evaluate(self, expression: ir.Operand | None) -> Value | WrittenNumber:
+        """Return what an expression is worth, a number with where it comes from."""
         match expression:
             case ir.Num(slot):
-                number = self.number(slot)
-                return (
-                    Nothing("the number cannot be read") if number != number else number
-                )
+                lines = self.place.program.lines
+                at = int(lines.first[self.row]) + slot
+                value = float(lines.value[at])
+                value = value if math.isfinite(value) else math.nan
+                return WrittenNumber(value, self.place.first + at)
             case ir.StringLiteral(text):
                 return text
             case ir.DataObject():
                 return self.read(expression)
             case ir.Operation("()", (operand,)):
-                return self.value(operand)
+                return self.evaluate(operand)
+            case ir.Operation("+" | "-" as sign, (left, right)):
+                return self._add(sign, self.evaluate(left), right)
             case ir.Operation(sign, operands):
                 values = [*map(self.value, operands)]
                 for frame in values if sign == ":" else ():
                     self.world.pin(frame, "the program composes it with a frame (`:`)")
                 return operate(sign, *map(self.find_taught, values))
-            case ir.Composite(items) if len(items) < 6:
-                return Nothing("it has fewer than six joint values")
-            case ir.Composite(items):
+            case ir.Composite(items) if len(items) >= 6:
                 own = enumerate(items[6:], start=1)
                 aux = tuple((axis, self.real(item)) for axis, item in own)
                 return replace(self._components(items[:6]), joints=True, aux=aux)
+            case ir.Composite():
+                return Nothing("it has fewer than six joint values")
             case ir.FunctionCall(name):
                 answer = self.store.get_assigned(self.answer_key(expression))
                 return answer or self._invoke(name, expression.values)
         return RUN_TIME
 
+    def _add(
+        self, sign: str, left: Value | WrittenNumber, right: ir.Operand
+    ) -> Value | WrittenNumber:
+        """Add to a value; a part of a position plus a constant moves along with it."""
+        if not (isinstance(left, WrittenNumber) and left.along):
+            return operate(sign, self._use(left), self.value(right))
+        value = self.real(right)
+        by = math.nan if value is None or abs(value) > FARTHEST else value
+        return replace(left, value=left.value + (by if sign == "+" else -by))
+
     def answer_key(self, call: ir.FunctionCall) -> str:
         """Return where it is kept what a function of the job has returned."""
         return f"{self.place.program.name}:{self.place.body.name}/{hash(call)}"
 
-    def read(self, reference: ir.DataObject) -> Value:
+    def read(self, reference: ir.DataObject) -> Value | WrittenNumber:
         """Return what a variable holds."""
         name = reference.name
         if name.startswith("$"):
@@ -197,9 +233,11 @@ class Execution:
         held = self.store.read(target.key)
         if target.component == ():
             return held
-        if target.number >= 0:
-            why = "the program computes with a part of it"
-            self.world.pin(held, why, (target.number,))
+        at = target.number
+        if at >= 0 and isinstance(held, Nothing):
+            self.world.pin(held, "the program computes with a part of it")
+        if at >= 0 and isinstance(held, Position) and held.slots[at] >= 0:
+            return replace(held.number(at), along=True)
         return part_of(held, target.component)
 
     def _unsteady(self, target: Location) -> bool:
@@ -238,7 +276,7 @@ class Execution:
         return None, ()
 
     def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
-        parts = [self.read_number(item) for item in items]
+        parts = [*map(self.number, items)]
         values = (part.value for part in parts)
         return Position(
             numbers=tuple(None if value != value else value for value in values),
@@ -262,51 +300,6 @@ class Execution:
         places = (self.locate(one) for one in parts if not one.name.startswith("$"))
         held = (self.store.read(key) for place in places for key in place.keys)
         return any(isinstance(one, Position) and one.taught for one in held)
-
-    def read_number(self, expression: ir.Operand | None) -> WrittenNumber:
-        """Return a number, and where in the text it is written or comes from."""
-        match expression:
-            case ir.Num(slot):
-                lines = self.place.program.lines
-                at = int(self.place.first + lines.first[self.row] + slot)
-                return self._with_slot(expression, at)
-            case ir.Operation("()", (operand,)):
-                return self.read_number(operand)
-            case ir.DataObject():
-                return self._part(expression) or self._with_slot(expression)
-            case ir.Operation("+" | "-" as sign, (ir.DataObject() as left, right)):
-                part = self._part(left)
-                if part is not None:
-                    by = self._with_slot(right).value
-                    by = math.nan if abs(by) > FARTHEST else by
-                    return replace(
-                        part, value=part.value + (by if sign == "+" else -by)
-                    )
-        return self._with_slot(expression)
-
-    def _with_slot(
-        self, expression: ir.Operand | None, slot: int = -1
-    ) -> WrittenNumber:
-        value = self.real(expression)
-        return WrittenNumber(math.nan if value is None else value, slot)
-
-    def _part(self, reference: ir.DataObject) -> WrittenNumber | None:
-        """Return a component that stands in the text, None for anything else."""
-        if reference.name.startswith("$"):
-            return None
-        target = self.locate(reference)
-        at = target.number
-        if at < 0 or not target.exact or self._unsteady(target):
-            return None
-        held = self.store.read(target.key)
-        if not isinstance(held, Position) or held.slots[at] < 0:
-            return None
-        return replace(held.number(at), along=True)
-
-    def real(self, expression: ir.Operand | None) -> float | None:
-        """Return a real number, None where it is not known."""
-        value = self.value(expression)
-        return value if isinstance(value, float) and math.isfinite(value) else None
 
     def _invoke(self, name: str, arguments: tuple[ir.Operand | None, ...]) -> Value:
         if name == "pos":

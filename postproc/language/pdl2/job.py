@@ -264,16 +264,20 @@ class World:
             self._said.add((code, what))
             self.report(program, row, code, message)
 
-    def pin(self, value: Value, why: str, components: Iterable[int] = range(6)) -> None:
+    def pin(self, value: Value, why: str) -> None:
         """Keep the numbers of a position because something else depends on them."""
         if isinstance(value, Position):
-            for at in components:
-                if value.slots[at] >= 0:
-                    self.pinned.setdefault(value.slots[at], why)
+            for slot in value.slots:
+                self.pin_number(slot, why)
         elif isinstance(value, Nothing) and value.of not in self._kept:
             self._kept.add(value.of)
             for slot in value.of:
-                self.pinned.setdefault(slot, why)
+                self.pin_number(slot, why)
+
+    def pin_number(self, slot: int, why: str) -> None:
+        """Keep a number, by its index in the job, -1 for none."""
+        if slot >= 0:
+            self.pinned.setdefault(slot, why)
 
     def is_listed(self, name: str) -> bool:
         """Tell whether the cell file says that a point was taught."""

@@ -144,7 +144,7 @@ _UNREAD = Reason(Code.UNREADABLE_NUMBER, "a number of the target cannot be read"
 def _is_unread(here: Execution, place: ir.Operand) -> bool:
     """Tell whether a number of a written target cannot be read."""
     numbers = (one for one in ir.walk(place) if isinstance(one, ir.Num))
-    return not all(math.isfinite(here.number(one.slot)) for one in numbers)
+    return not all(math.isfinite(here.number(one).value) for one in numbers)
 
 
 def _why(word: str) -> Reason:

@@ -1,0 +1,54 @@
+"""What expressions are worth, and which numbers they leave free."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
+from postproc.language.text.source import source_from_bytes
+from postproc.language.visits import Visits
+
+HEAD = """PROGRAM job
+VAR p, q : POSITION
+  n : INTEGER
+BEGIN
+p := POS(1, 2, 3, 4, 5, 6, '')
+MOVE LINEAR TO p
+q := p
+"""
+
+
+def visits(*lines: str, head: str = HEAD) -> Visits:
+    text = "\n".join([head, *lines, "END job"])
+    return resolve(parse(source_from_bytes("job.pdl", text.encode()))).visits
+
+
+ALONG = {
+    "p.x + 1": 2.0,
+    "p.x - 1": 0.0,
+    "(p.x)": 1.0,
+    "(p.x) + 1": 2.0,
+    "p.x + 1 + 2": 4.0,
+    "p.x - (n + 1)": -4.0,
+}
+
+
+@pytest.mark.parametrize(("sum_", "x"), ALONG.items())
+def test_a_part_plus_constants_moves_along_with_its_point(sum_: str, x: float):
+    found = visits("n := 4", f"q.x := {sum_}", "MOVE LINEAR TO q")
+    assert found.target.values[1][0] == x
+    assert found.target.follows[1] == found.target.literal[0] == 0
+    assert found.literals.pinned == ("",)
+
+
+@pytest.mark.parametrize("used", ["1 + p.x", "p.x * 1", "-p.x", "ABS(p.x)"])
+def test_a_part_that_is_computed_with_otherwise_stays(used: str):
+    found = visits(f"q.x := {used}")
+    assert found.literals.pinned == ("the program computes with a part of it",)
+
+
+@pytest.mark.parametrize("line", ["n := p.x + 1", "IF p.x + 1 > 2 THEN\nENDIF"])
+def test_a_sum_that_no_point_takes_keeps_the_part(line: str):
+    found = visits(line)
+    assert found.literals.pinned == ("the program computes with a part of it",)
