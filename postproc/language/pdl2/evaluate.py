@@ -193,7 +193,9 @@ class Execution:
                 return Nothing("it has fewer than six joint values")
             case ir.FunctionCall(name):
                 answer = self.store.get_assigned(self.answer_key(expression))
-                return answer or self._invoke(name, expression.values)
+                if answer is not None:
+                    return answer
+                return self._invoke(name, expression.values)
         return RUN_TIME
 
     def _add(

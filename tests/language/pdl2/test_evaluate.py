@@ -52,3 +52,23 @@ def test_a_part_that_is_computed_with_otherwise_stays(used: str):
 def test_a_sum_that_no_point_takes_keeps_the_part(line: str):
     found = visits(line)
     assert found.literals.pinned == ("the program computes with a part of it",)
+
+
+FUNCTION = """PROGRAM job
+VAR n : INTEGER
+ROUTINE f : {}
+BEGIN
+  RETURN({})
+END f
+BEGIN
+"""
+ANSWERS = [("INTEGER", "0", "f = 0"), ("INTEGER", "1", "f = 1"),
+           ("BOOLEAN", "FALSE", "NOT f"), ("BOOLEAN", "TRUE", "f")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("type_", "answer", "condition"), ANSWERS)
+def test_what_a_function_returns_decides_a_way(type_: str, answer: str, condition: str):
+    body = [f"IF {condition} THEN", "MOVE JOINT TO {1, 2, 3, 4, 5, 6}", "ELSE"]
+    body += ["MOVE JOINT TO {2, 2, 3, 4, 5, 6}", "ENDIF"]
+    found = visits(*body, head=FUNCTION.format(type_, answer))
+    assert found.target.values[:, 0].tolist() == [1.0]
