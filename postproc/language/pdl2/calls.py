@@ -35,7 +35,6 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.values import (
-    Alias,
     Component,
     Nothing,
     Position,
@@ -198,7 +197,7 @@ def _bind(
         if isinstance(argument, ir.DataObject) and not argument.name.startswith("$"):
             target = here.locate(argument)
             if target.component == ():
-                here.store.write(key, Alias(target.keys, target.exact))
+                here.store.write(key, target)
                 continue
             for aliased in target.keys:
                 invalidate_key(here, aliased, f"{inside.body.name} may change it")

@@ -16,7 +16,6 @@ from postproc.language.pdl2.values import (
     COMPONENTS,
     FARTHEST,
     RUN_TIME,
-    Alias,
     Component,
     Location,
     Nothing,
@@ -93,7 +92,7 @@ class Execution:
         root = self.world.root(self.place, reference.name)
         held = self.store.values.get(root)
         keys, exact = frozenset({root}), True
-        if isinstance(held, Alias):
+        if isinstance(held, Location):
             keys, exact = held.keys, held.exact
         type_ = self.world.type_of(self.place, reference.name)
         plain = type_ is not None and type_.name in _POSITION_TYPES and not type_.path

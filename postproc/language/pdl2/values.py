@@ -51,19 +51,6 @@ def points_of(arm: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Alias:
-    """A parameter stands for the caller's variables.
-
-    Attributes:
-        keys: Where they are stored; one key where it is known which.
-        exact: False where only the array or record is known.
-    """
-
-    keys: frozenset[str]
-    exact: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Vector:
     """A VECTOR, [mm] where it is a place."""
 
@@ -131,7 +118,41 @@ class Position:
         return replace(self, aux=tuple(sorted((*rest, (axis, value)))))
 
 
-Value = float | bool | str | Position | Vector | Alias | Nothing
+Component = int | str | tuple[str, int] | tuple[()] | None
+"""Which part of a position: of its six numbers, ``pos``, or (``aux``, i) of an axis.
+
+() is the whole value, None a part that only the run tells.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """Where a reference leads: a key and the component of the value there.
+
+    A parameter that stands for the caller's variables holds where these are.
+
+    Attributes:
+        keys: Keys it may mean.
+        exact: It means the one key, not some element of it.
+        component: The part of the value there that is meant.
+    """
+
+    keys: frozenset[str]
+    exact: bool
+    component: Component = ()
+
+    @property
+    def key(self) -> str:
+        """Return the one key."""
+        return next(iter(self.keys))
+
+    @property
+    def number(self) -> int:
+        """Which of the six numbers of a position is meant, -1 for anything else."""
+        return self.component if isinstance(self.component, int) else -1
+
+
+Value = float | bool | str | Position | Vector | Location | Nothing
 
 
 def join(a: Value, b: Value) -> Value:
@@ -142,8 +163,8 @@ def join(a: Value, b: Value) -> Value:
         return add_unknown(a, b)
     if isinstance(b, Nothing):
         return add_unknown(b, a)
-    if isinstance(a, Alias) and isinstance(b, Alias):
-        return Alias(a.keys | b.keys, False)
+    if isinstance(a, Location) and isinstance(b, Location):
+        return Location(a.keys | b.keys, False)
     if isinstance(a, Position) and isinstance(b, Position):
         fields = ("joints", "numbers", "slots", "along", "config")
         if all(getattr(a, name) == getattr(b, name) for name in fields):
@@ -253,13 +274,6 @@ _LOGICAL = ("AND", "OR", "NOT")
 _NO_RESULT = Nothing("the arithmetic has no result")
 
 
-Component = int | str | tuple[str, int] | tuple[()] | None
-"""Which part of a position: of its six numbers, ``pos``, or (``aux``, i) of an axis.
-
-() is the whole value, None a part that only the run tells.
-"""
-
-
 def part_of(held: Value, component: Component) -> Value:
     """Return a component of a position or vector."""
     if not isinstance(held, Position | Vector):
@@ -300,28 +314,3 @@ def operate(sign: str, *parts: Value) -> Value:
 
 def _number(sign: str, parts: Sequence[float | None]) -> float:
     return apply_operator(sign, [math.nan if one is None else one for one in parts])
-
-
-@dataclass(frozen=True)
-class Location:
-    """Where a reference leads: a key and the component of the value there.
-
-    Attributes:
-        keys: Keys it may mean.
-        exact: It means the one key, not some element of it.
-        component: The part of the value there that is meant.
-    """
-
-    keys: frozenset[str]
-    exact: bool
-    component: Component = ()
-
-    @property
-    def key(self) -> str:
-        """Return the one key."""
-        return next(iter(self.keys))
-
-    @property
-    def number(self) -> int:
-        """Which of the six numbers of a position is meant, -1 for anything else."""
-        return self.component if isinstance(self.component, int) else -1
