@@ -292,40 +292,28 @@ def read_move(here: Execution, statement: ast.Move) -> Pdl2Visit:
 def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     """Record the visits of a move and let the arm stand at its end."""
     _beside(machine, here, statement)
-    store = here.store
-    whose = here.is_ours(statement.arm)
+    store, whose = here.store, here.is_ours(statement.arm)
     if whose is False:
         _keep(here, statement)
         return
-    settings = _with(here, statement)
-    motion, reason = motion_of(here, statement, settings)
+    found = read_move(here, statement)
     if whose is None:
         named = statement.arm is not None
         unsure = "the arm that moves (ARM[..]) is known only at run time"
         text = unsure if named else here.other_default()
-        reason = Reason(Code.OTHER_ARM, text)
-    reason = here.reason or reason
-    predecessors = machine.predecessors(here)
-    several = len(predecessors) > 1
-
-    def arrive(goal: Pdl2Goal, via: bool, fly: bool) -> int:
-        visit = Pdl2Visit(
-            here.place, motion, via, goal, settings, predecessors, reason,
-            at=here.row, fly=fly,
-        )  # fmt: skip
-        return machine.record(here, not via, visit)
-
+        found.why = here.reason or Reason(Code.OTHER_ARM, text)
+    found.origins = predecessors = machine.predecessors(here)
     if statement.via is not None:
         goal = absolute(here, statement.via)
-        predecessors = frozenset({arrive(goal, True, True)})
+        way = replace(found, goal=goal, via=True, fly=True)
+        found.origins = frozenset({machine.record(here, 0, way)})
         if machine.interrupted:  # the arm may have been moved off the way
-            predecessors |= NOWHERE
-    goal = goal_of(here, statement, motion)
-    store.last = frozenset({arrive(goal, False, statement.fly)})
-    if several and goal.target in _FROM_HERE:
+            found.origins |= NOWHERE
+    store.last = frozenset({machine.record(here, 1, found)})
+    if len(predecessors) > 1 and found.goal.target in _FROM_HERE:
         store.last |= NOWHERE
     if statement.til is not None or whose is None:
-        store.last |= predecessors if statement.til is None else NOWHERE
+        store.last |= found.origins if statement.til is None else NOWHERE
 
 
 ALONG_WITH = Reason(
