@@ -6,11 +6,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from postproc.language import ir
 from postproc.language.analysis.call_graph import reach
+from postproc.language.analysis.task_machine import MOVES
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import FRAMES
 from postproc.language.pdl2.external_routines import (
@@ -72,22 +74,21 @@ def is_harmless(text: str) -> bool:
     return called <= PURE | CHANGING | ast.NAMES["statement"]
 
 
-@dataclass(frozen=True)
-class Effects:
+class Effects(NamedTuple):
     """What statements may do, without the routines that they call.
 
     Attributes:
-        moves: They hold a move, or text that is not understood.
+        moves: `MOVES` where one is a move, or text that is not understood.
         assigned: Names of variables and settings (with ``$``) that they may change.
         read: Names of variables and settings that occur in them.
         calls: Names that they call and their file does not hold.
         cancels: Those of them that end moves on their way.
     """
 
-    moves: bool
-    assigned: frozenset[str]
-    read: frozenset[str]
-    calls: frozenset[str]
+    moves: frozenset[str] = frozenset()
+    assigned: frozenset[str] = frozenset()
+    read: frozenset[str] = frozenset()
+    calls: frozenset[str] = frozenset()
     cancels: frozenset[ir.SourceStatement] = frozenset()
 
 
@@ -108,14 +109,9 @@ def list_changed_arguments(
 
 def rows_effects(program: Program, first: int, last: int) -> Effects:
     """Return what the statements of rows first to last - 1 may do."""
-    own = [_direct(one) for one in _list_statements(program, first, last)]
-    return Effects(
-        any(e.moves for e in own),
-        frozenset().union(*(e.assigned for e in own)),
-        frozenset().union(*(e.read for e in own)),
-        frozenset().union(*(e.calls for e in own)).difference(program.routines),
-        frozenset().union(*(e.cancels for e in own)),
-    )
+    every = map(_direct, _list_statements(program, first, last))
+    found = Effects(*(frozenset().union(*own) for own in zip(*every, strict=True)))
+    return found._replace(calls=found.calls.difference(program.routines))
 
 
 def names_but_ends(program: Program, first: int, last: int) -> frozenset[str]:
@@ -163,7 +159,8 @@ def _direct(statement: ir.SourceStatement) -> Effects:
     assigned.update(map(_name_assigned, list_changed_arguments(tuple(changed))))
     if TRACKING in called:
         assigned.add(f"${TRACKING}")
-    moves = any(isinstance(one, ast.Move | ir.NotUnderstood) for one in chain)
+    moving = any(isinstance(one, ast.Move | ir.NotUnderstood) for one in chain)
+    moves = frozenset([MOVES] if moving else [])
     read = frozenset(data.name for data in ir.data_in(statement))
     ends = (one for one in chain[-1:] if isinstance(one, ast.CancelMove) or one == _END)
     called -= PURE | CHANGING
