@@ -289,7 +289,7 @@ class ScopeHead(SourceStatement):
     """``MODULE name(..)``, ``RECORD name``, ``DEFDAT name``: what declares data.
 
     Attributes:
-        kind: module, record or defdat.
+        kind: module, record, defdat, or import.
         name: Its name.
         attributes: Words behind it.
     """

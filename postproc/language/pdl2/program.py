@@ -338,21 +338,21 @@ class _Reader:
     def take(self, row: int, statement: ir.SourceStatement) -> None:
         scope = self.scopes[-1]
         match statement:
-            case ast.DeclarationSection(then) if then is not None:
+            case ir.BlockWord("section", then) if then is not None:
                 self.take(row, then)
             case ast.ProgramHead(name, slot):
                 self.name = name
                 self.arm = self._arm(row, slot)
-            case ast.Import(file):
+            case ir.ScopeHead("import", file):
                 self.imports.append(file)
-            case ast.Structure(name):
+            case ir.ScopeHead("record", name):
                 self.structure = name
             case ast.NodeFields(names) if self.structure:
                 known = self.nodes.get(self.structure, frozenset())
                 self.nodes[self.structure] = known.union(names)
-            case ast.EndStructure():
+            case ir.BlockWord("endrecord"):
                 self.structure = ""
-            case ast.Declare() | ast.Constant() if scope.begin < 0:
+            case ast.Declare() if scope.begin < 0 and not self.structure:
                 self._declare(row, statement)
             case ast.Routine(name, _, exported):
                 if exported and exported != self.name:
@@ -360,7 +360,7 @@ class _Reader:
                 else:
                     self._before_next(row)
                     self.scopes.append(_Scope(statement, row))
-            case ast.Begin():
+            case ir.BlockWord("begin"):
                 if scope.begin >= 0:
                     self._before_next(row)
                 if self.scopes[-1].begin < 0:
@@ -379,21 +379,13 @@ class _Reader:
         number = float(self.lines.value[self.lines.first[row] + slot])
         return int(number) if number.is_integer() else 0
 
-    def _declare(self, row: int, statement: ast.Declare | ast.Constant) -> None:
-        if self.structure:
-            return
-        variables = self.scopes[-1].variables
-        if isinstance(statement, ast.Constant):
-            name, value = statement.name, statement.value
-            constant = Variable(name, row, initial=value, constant=True)
-            variables.declare([name], constant)
-            return
+    def _declare(self, row: int, one: ast.Declare) -> None:
+        arm = -1 if one.type is None else one.type.arm
         said = Variable(
-            "", row, statement.type, statement.initial, statement.exported,
-            "const" in statement.attributes, self.lines.line(row) in self.taught,
-            self._arm(row, statement.type.arm),
+            "", row, one.type, one.initial, one.exported, "const" in one.attributes,
+            self.lines.line(row) in self.taught, self._arm(row, arm),
         )  # fmt: skip
-        variables.declare(statement.names, said)
+        self.scopes[-1].variables.declare(one.names, said)
 
     def _before_next(self, row: int) -> None:
         """End or drop a routine because the next body or routine begins."""

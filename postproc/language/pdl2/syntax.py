@@ -39,20 +39,6 @@ class ProgramHead(ir.SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class Import(ir.SourceStatement):
-    """``IMPORT 'file'``."""
-
-    file: str
-
-
-@dataclass(frozen=True, slots=True)
-class DeclarationSection(ir.SourceStatement):
-    """``VAR``, ``CONST``, ``TYPE``, alone or with a declaration."""
-
-    then: ir.SourceStatement | None
-
-
-@dataclass(frozen=True, slots=True)
 class FormalParameter:
     """One formal parameter."""
 
@@ -71,28 +57,13 @@ class Routine(ir.SourceStatement):
 
 @dataclass(frozen=True, slots=True)
 class Declare(ir.SourceStatement):
-    """``a, b : TYPE (initial)``; the names as they are written."""
+    """``a, b : TYPE (initial)``, the names as they are written; ``name = value``."""
 
     names: tuple[str, ...]
-    type: Type
+    type: Type | None
     initial: ir.Operand | None
-    exported: str
-    attributes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Constant(ir.SourceStatement):
-    """``name = value`` in a CONST section."""
-
-    name: str
-    value: ir.Operand
-
-
-@dataclass(frozen=True, slots=True)
-class Structure(ir.SourceStatement):
-    """``name = RECORD | NODEDEF``; its fields follow up to `EndStructure`."""
-
-    name: str
+    exported: str = ""
+    attributes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,16 +71,6 @@ class NodeFields(ir.SourceStatement):
     """``$MAIN_POS, $LIN_SPD``: standard fields that nodes have, in lower case."""
 
     names: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class EndStructure(ir.SourceStatement):
-    """``ENDRECORD``, ``ENDNODEDEF``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Begin(ir.SourceStatement):
-    """``BEGIN``."""
 
 
 @dataclass(frozen=True, slots=True)
