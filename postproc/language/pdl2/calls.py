@@ -56,14 +56,14 @@ def summarise_call(
     name: str,
     reach: side_effects.CallGraph,
     arguments: tuple[ir.Operand | None, ...] = (),
-    parameters: Sequence[ast.FormalParameter] = (),
+    parameters: Sequence[str] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
-    still = {one.name for one in parameters} - reach.may_change
+    still = {*parameters} - reach.may_change
     for at, argument in enumerate(arguments):
         if isinstance(argument, ir.DataObject):
             here.world.pin(here.value(argument), f"{name} may move to it")
-            if at >= len(parameters) or parameters[at].name not in still:
+            if at >= len(parameters) or parameters[at] not in still:
                 invalidate(here, argument, f"{name} may change it")
     take_effects(
         here, reach.parts, f"{name} may compute with it", f"{name} may change it"
@@ -162,7 +162,7 @@ def _run_function(
     """
     store, body = here.store.copy(), inside.body
     _bind(replace(here, store=store), inside, call.values)
-    given = {parameter.name for parameter in body.parameters}
+    own = body.own_names.difference(body.parameters)
     for row in range(body.flow.first, body.flow.last):
         at = Execution(here.world, inside, row, store, here.context)
         one = inside.statement(row)
@@ -174,7 +174,7 @@ def _run_function(
                 if isinstance(found, Position):
                     found = replace(found, derived=f"{body.name} returns it")
                 return found
-            case ir.Assignment(target) if target.name in body.own_names - given:
+            case ir.Assignment(target) if target.name in own:
                 assign(at, one, False)
             case _ if type(one) is not ir.SourceStatement:
                 return None
@@ -188,9 +188,8 @@ def _bind(
     prefix = f"{inside.program.name}:{inside.body.name}/"
     for at, parameter in enumerate(inside.body.parameters):
         argument = arguments[at] if at < len(arguments) else None
-        key = prefix + parameter.name
-        other = inside.body.arms.get(parameter.name, here.world.arm)
-        if other != here.world.arm:
+        key = prefix + parameter
+        if other := here.world.other_arm(inside, parameter):
             here.world.pin(here.value(argument), f"arm {other} goes to it too")
             here.store.write(key, Nothing(points_of(other)))
             continue
@@ -206,11 +205,11 @@ def _bind(
             continue
         given = bare(argument)
         if given is not None and (parts := parts_of(here, given)):
-            fill(here, key, parameter.name, given.name, parts)
+            fill(here, key, parameter, given.name, parts)
             continue
         value = here.value(argument)
         if isinstance(value, Position) and not value.name:
-            value = replace(value, name=f"{inside.body.name}.{parameter.name}")
+            value = replace(value, name=f"{inside.body.name}.{parameter}")
         here.store.write(key, value)
 
 

@@ -63,7 +63,7 @@ class Pdl2Cloner(Cloner):
         if where.steps:
             raise CloneError("elements of arrays, records and paths are not cloned")
         body = body_at(program, row)
-        if any(p.name == where.name for p in body.parameters):
+        if where.name in body.parameters:
             raise CloneError(f"{where.name} is a parameter")
         own = body.variables.get(where.name)
         variable = own or program.variables.get(where.name)

@@ -370,19 +370,13 @@ class World:
 
     def type_of(self, place: Place, name: str) -> ast.Type | None:
         """Return the declared type of a name."""
-        for parameter in place.body.parameters:
-            if parameter.name == name:
-                return parameter.type
         declared = self.find_declaration(place, name)
         return declared.type if declared else None
 
     def other_arm(self, place: Place, name: str) -> int:
         """Return the arm whose points a variable holds, 0 where it is ours."""
-        arm = place.body.arms.get(name, 0)
-        if not arm:
-            declared = self.find_declaration(place, name)
-            arm = declared.arm if declared else 0
-        return 0 if arm == self.arm else arm
+        declared = self.find_declaration(place, name)
+        return declared.arm if declared and declared.arm != self.arm else 0
 
     def is_function(self, place: Place, name: str) -> bool:
         """Tell whether a name by itself calls a routine."""

@@ -122,7 +122,7 @@ class BodyLines:
         """
         self._world, self._place, self.plain = world, place, plain
         body = place.body
-        self._parameters = {p.name for p in body.parameters}
+        self._parameters = {*body.parameters}
         self.first, self.prefix = body.first + 1, f"{place.program.name}/"
         variant = plain.variant[self.first : body.last].astype(np.int64)
         number, example = number_in_order(variant)

@@ -58,9 +58,9 @@ def _arm_slot(c: Children) -> int:
 
 
 def _routine(c: Children) -> ast.Routine:
-    parameters = next((one for one in c if isinstance(one, list)), [])
+    parameters = next((one for one in c if isinstance(one, tuple)), ())
     exported, _ = _read_attributes(c, 1)
-    return ast.Routine(low(c[0]), tuple(parameters), exported)
+    return ast.Routine(low(c[0]), parameters, exported)
 
 
 def _variables(c: Children) -> ast.Declare:
@@ -171,8 +171,7 @@ RULES: Mapping[str, Rule] = {
     "begin": lambda c: ir.BlockWord("begin"),
     "end": lambda c: ast.End(low(c[0]) if c else ""),
     "routine": _routine,
-    "parameters": lambda c: [p for group in c for p in group],
-    "parameter": lambda c: [ast.FormalParameter(n.lower(), c[1]) for n in c[0]],
+    "parameter": lambda c: ast.Declare(tuple(map(low, c[0])), c[1], None),
     "variables": _variables,
     "constant": lambda c: ast.Declare((low(c[0]),), None, c[1], attributes=("const",)),
     "structure": lambda c: ir.ScopeHead("record", low(c[0])),

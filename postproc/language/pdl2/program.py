@@ -229,28 +229,26 @@ class Body:
     Attributes:
         name: Routine name in lower case, "" for the main part.
         first, last: Rows of its BEGIN and of its END.
-        parameters: Formal parameters.
-        variables: Its own variables, by lower-case name; the main part has none.
+        parameters: Names of its formal parameters, in lower case.
+        variables: These and its own variables, by name; the main part has none.
         flow: Where its jumps lead.
         broken: First line whose block structure is wrong, 0 where all is well.
-        arms: ``FOR ARM[n]`` of its parameters, by name, where it is said.
         exported: Other programs may call it.
     """
 
     name: str
     first: int
     last: int
-    parameters: tuple[ast.FormalParameter, ...]
+    parameters: tuple[str, ...]
     variables: Variables
     flow: ControlFlow
     broken: int = 0
-    arms: Mapping[str, int] = field(default_factory=dict)
     exported: bool = False
 
     @cached_property
     def own_names(self) -> frozenset[str]:
         """Return the names that mean something else here than around it."""
-        return frozenset(self.variables) | {p.name for p in self.parameters}
+        return frozenset(self.variables)
 
 
 @dataclass(frozen=True)
@@ -422,12 +420,12 @@ class _Reader:
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()
         own = scope.variables if routine else Variables()
-        given = {p.name: self._arm(scope.row, p.type.arm) for p in parameters}
-        arms = {name: arm for name, arm in given.items() if arm}
+        for one in parameters:
+            arm = self._arm(scope.row, one.type.arm if one.type else -1)
+            own.declare(one.names, Variable("", scope.row, one.type, arm=arm))
+        names = tuple(name for one in parameters for name in one.names)
         exported = bool(routine and routine.exported)
-        body = Body(
-            name, scope.begin, last, parameters, own, flow, broken, arms, exported
-        )
+        body = Body(name, scope.begin, last, names, own, flow, broken, exported)
         if routine:
             self.routines[name] = body
             self.scopes.pop()

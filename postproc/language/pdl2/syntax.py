@@ -39,23 +39,6 @@ class ProgramHead(ir.SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
-class FormalParameter:
-    """One formal parameter."""
-
-    name: str
-    type: Type
-
-
-@dataclass(frozen=True, slots=True)
-class Routine(ir.SourceStatement):
-    """``ROUTINE name(..)``; `exported` names the program that holds it, or is ""."""
-
-    name: str
-    parameters: tuple[FormalParameter, ...]
-    exported: str
-
-
-@dataclass(frozen=True, slots=True)
 class Declare(ir.SourceStatement):
     """``a, b : TYPE (initial)``, the names as they are written; ``name = value``."""
 
@@ -64,6 +47,15 @@ class Declare(ir.SourceStatement):
     initial: ir.Operand | None
     exported: str = ""
     attributes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Routine(ir.SourceStatement):
+    """``ROUTINE name(..)``; `exported` names the program that holds it, or is ""."""
+
+    name: str
+    parameters: tuple[Declare, ...]
+    exported: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,3 +72,19 @@ def test_what_a_function_returns_decides_a_way(type_: str, answer: str, conditio
     body += ["MOVE JOINT TO {2, 2, 3, 4, 5, 6}", "ENDIF"]
     found = visits(*body, head=FUNCTION.format(type_, answer))
     assert found.target.values[:, 0].tolist() == [1.0]
+
+
+HIDING = """PROGRAM job
+VAR p : POSITION FOR ARM[2]
+ROUTINE go(p : POSITION)
+BEGIN
+  p := POS(1, 2, 3, 4, 5, 6, '')
+  MOVE LINEAR TO p
+END go
+BEGIN
+"""
+
+
+def test_a_parameter_hides_a_variable_of_another_arm():
+    found = visits("go(POS(2, 2, 3, 4, 5, 6, ''))", head=HIDING)
+    assert found.target.values[:, 0].tolist() == [1.0]
