@@ -1,5 +1,5 @@
 //! Logical lines of PDL2, which statements may go on over, and which may open a block
-//! behind another one: `postproc.language.logical_lines`.
+//! behind another one: `postproc.language.text.statement_table`.
 //!
 //! `tests/reference/logical.py` defines both with regular expressions.
 

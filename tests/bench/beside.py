@@ -15,8 +15,8 @@ from postproc.compensation.program import plan_visits, read_program, states_of
 from postproc.compensation.solver.inverse_model import solve
 from postproc.language.pdl2.program import parse
 from postproc.language.text.grammars import line_parser
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
+from postproc.language.text.statement_table import read_lines
 from postproc.model.model import Model, load_model
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell

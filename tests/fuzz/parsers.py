@@ -10,10 +10,9 @@ import numpy as np
 from postproc.exceptions import PostprocError
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.number_edits import difference
 from postproc.language.text.source import Replacements, Source, apply, source_from_bytes
-from postproc.language.text.statement_table import Statements
+from postproc.language.text.statement_table import Statements, read_lines
 
 
 def program(data: bytes) -> None:

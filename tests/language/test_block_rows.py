@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
+from postproc.language.text.statement_table import read_lines
 from tests.reference.logical import logical_lines
 from tests.reference.text import form_of, mask_line, masks_of
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
 from postproc.language.text.lexer import scan_lines
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
+from postproc.language.text.statement_table import read_lines
 from tests.reference.text import form_of, mask_line, masks_of, number_value
 
 PIECES = (

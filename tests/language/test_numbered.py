@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from postproc.language.text.lexer import mask_of, scan_lines
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source, source_from_bytes
-from postproc.language.text.statement_table import Statements
+from postproc.language.text.statement_table import Statements, read_lines
 from tests.reference.text import HIDDEN, form_of, mask_line, masks_of
 
 PIECES = (

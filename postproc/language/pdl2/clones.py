@@ -15,7 +15,6 @@ from postproc.language.pdl2.entries import EntryLines, is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program
 from postproc.language.text.lexer import scan_lines
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import (
     CloneError,
     Edit,
@@ -24,6 +23,7 @@ from postproc.language.text.source import (
     find_free_name,
     insert_after,
 )
+from postproc.language.text.statement_table import read_lines
 from postproc.language.visits import Literals
 
 LONGEST_NAME = 32  # characters of an identifier (likely)

@@ -18,9 +18,8 @@ from postproc.language.analysis.control_flow import ControlFlow, FlowReader
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
 from postproc.language.pdl2.pose_encoding import COMMENTS
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source
-from postproc.language.text.statement_table import Statements
+from postproc.language.text.statement_table import Statements, read_lines
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 

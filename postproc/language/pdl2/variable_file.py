@@ -26,8 +26,8 @@ from postproc.language.pdl2.entries import (
 )
 from postproc.language.pdl2.nested import complete_entries, find_fields, with_fields
 from postproc.language.pdl2.parser import parse_value_form
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import Source
+from postproc.language.text.statement_table import read_lines
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 

@@ -13,7 +13,6 @@ from postproc import _native
 from postproc.arrays import Floats, Indices, Ints, chunks, floats
 from postproc.exceptions import ProgramError
 from postproc.language.pose_encoding import Dialect
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import (
     NumberSpans,
     Replacements,
@@ -22,7 +21,7 @@ from postproc.language.text.source import (
     apply,
     as_texts,
 )
-from postproc.language.text.statement_table import Statements
+from postproc.language.text.statement_table import Statements, read_lines
 from postproc.language.text.templates import Shapes
 from postproc.language.visits import Literals
 

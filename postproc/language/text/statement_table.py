@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, release_memory
+from postproc import _native
+from postproc.arrays import Bools, Floats, Indices, Ints, release_memory
 from postproc.diagnostics import Code
 from postproc.exceptions import ProgramError
 from postproc.language import ir
 from postproc.language.text import templates
 from postproc.language.text.source import NumberSpans, Source, Span
+from postproc.language.text.symbol_column import NameColumn
 from postproc.language.visits import Diagnostic
 
 _WORD = re.compile(r"[A-Za-z_$]\w*")
 SHOWN = 60  # characters of a statement in a message
+_OPEN_STRING = "a string is not terminated"
 T = TypeVar("T")
 
 
@@ -173,6 +176,40 @@ class StatementText(Statements[T]):
         return repr(words if len(words) <= SHOWN else f"{words[:SHOWN]} ..")
 
 
+def read_lines(source: Source, parse: Callable[[str], Any] = str) -> Statements[Any]:
+    """Read the logical lines of a file.
+
+    A statement may go on over lines; a block that opens behind CASE or ELSE has a row
+    of its own.
+
+    Args:
+        source: The file.
+        parse: Says what the form of a line says.
+
+    Raises:
+        ProgramError: A string does not end on its line.
+    """
+    found = _native.scan_logical_lines(source.data, source.line_starts)
+    forms, (form, line, at, first), (places, value), names, unterminated = found
+    if unterminated:
+        cure = "Close it with an apostrophe on the same line."
+        raise ProgramError(source.name, _OPEN_STRING, cure, line=1 + unterminated[0])
+    said, shape = _parse(forms, form, at, names, parse)
+    return Statements(source, said, shape, line, first, NumberSpans(*places), value)
+
+
+def _parse(
+    forms: Sequence[bytes],
+    form: Indices,
+    at: Indices,
+    names: tuple[NameColumn, Ints],
+    parse: Callable[[str], T],
+) -> tuple[templates.ParsedShapes[T], Indices]:
+    """Parse each form once; return what every statement says, and its shape, (n,)."""
+    shapes, shape = templates.find_shapes(forms, form, at, names[1], names[0])
+    return templates.parse_shapes(shapes, parse), shape.astype(np.int32)
+
+
 def read_text(
     source: Source, scan: Callable[[bytes], tuple[Any, ...]], parse: Callable[[str], T]
 ) -> StatementText[T]:
@@ -193,18 +230,15 @@ def read_text(
         header = source.data[at : at + 1] == b"%"
         raise ProgramError(
             source.name,
-            "the header does not end" if header else "a string is not terminated",
+            "the header does not end" if header else _OPEN_STRING,
             "Close it with %%%." if header else "Close it with a quote on its line.",
             line=source.line_of(at),
         )
-    at_names = np.asarray(name_first[:-1])
-    shapes, shape = templates.find_shapes(forms, form, at_names, names[1], names[0])
-    said = templates.parse_shapes(shapes, parse)
+    said, shape = _parse(forms, form, np.asarray(name_first[:-1]), names, parse)
     places, value = numbers
     value[~np.isfinite(value)] = np.nan
     line = source.lines_of(begin).astype(np.int32)
     release_memory(len(value))
     return StatementText(
-        source, said, shape.astype(np.int32), line, first, NumberSpans(*places), value,
-        begin, end,
+        source, said, shape, line, first, NumberSpans(*places), value, begin, end,
     )  # fmt: skip

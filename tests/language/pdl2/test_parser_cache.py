@@ -9,8 +9,8 @@ import lark
 import pytest
 
 from postproc.language.text import grammars
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
+from postproc.language.text.statement_table import read_lines
 
 ROOT = Path(__file__).parents[3]
 

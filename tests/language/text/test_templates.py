@@ -7,8 +7,8 @@ import pytest
 from postproc.language import ir
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form, parse_value_form
-from postproc.language.text.logical_lines import read_lines
 from postproc.language.text.source import source_from_bytes
+from postproc.language.text.statement_table import read_lines
 from postproc.language.text.templates import filler
 from tests.reference.text import form_of
 
