@@ -88,20 +88,17 @@ def take_effects(
 
 def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
     """List the moves of a body once, from nowhere and with nothing known."""
-    program, body = place.program, place.body
-    first = place.offset + body.first
-    if machine.root.find(first, _UNFOLLOWED) or id(body) in machine.recursive:
+    first = place.offset + place.body.first
+    if machine.root.find(first, _UNFOLLOWED) or id(place.body) in machine.recursive:
         return
     context = machine.root.within(first, _UNFOLLOWED, place)
     why = f"{name}, which is not followed, runs this move"
     nothing, reason = Nothing(why), Reason(Code.NEVER_REACHED, why)
-    for row in range(body.first + 1, body.last):
-        statement = ast.action(program.lines.statement(row))
-        if isinstance(statement, ast.Move):
-            store = Store(lambda key: nothing, last=NOWHERE)
-            store.forget_frames(why)
-            at = Execution(here.world, place, row, store, context, reason)
-            move(machine, at, statement)
+    for row, statement in place.list_moves():
+        store = Store(lambda key: nothing, last=NOWHERE)
+        store.forget_frames(why)
+        at = Execution(here.world, place, row, store, context, reason)
+        move(machine, at, statement)
 
 
 # Calls: routines of the job are run, others are taken at their word.

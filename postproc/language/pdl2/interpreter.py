@@ -272,15 +272,11 @@ def _forget_by_text(here: Execution, text: str, why: str) -> bool:
 def run_broken(machine: Machine, here: Execution) -> None:
     """List the moves of a body whose blocks do not close; follow none of them."""
     body = here.place.body
-    program = here.place.program
     why = f"the block structure is broken (line {body.broken})"
     here.reason = Reason(Code.BLOCK_STRUCTURE, why)
-    for row in range(body.first + 1, body.last):
-        said = ast.action(program.lines.statement(row))
-        if isinstance(said, ast.Move):
-            here.row = row
-            here.store.last = NOWHERE
-            move(machine, here, said)
+    for row, one in here.place.list_moves():
+        here.row, here.store.last = row, NOWHERE
+        move(machine, here, one)
     inside = list_live(here.world, here.place, body.first, body.last)
     calls.take_effects(here, inside, f"{why}: it may be used in a computation", why)
     here.store.forget_frames(why)

@@ -164,6 +164,13 @@ class Place:
         """Return what a row says; of what is not understood, which block it opens."""
         return recover_block(self.program.lines.statement(row))
 
+    def list_moves(self) -> Iterator[tuple[int, ast.Move]]:
+        """Yield the moves of the body, with their rows."""
+        for row in range(self.body.first + 1, self.body.last):
+            one = ast.action(self.program.lines.statement(row))
+            if isinstance(one, ast.Move):
+                yield row, one
+
 
 @dataclass
 class World:
