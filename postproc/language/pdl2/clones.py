@@ -28,7 +28,6 @@ from postproc.language.visits import Literals
 
 LONGEST_NAME = 32  # characters of an identifier (likely)
 _EXPORTED = re.compile(r"\s+EXPORTED\s+FROM\s+\w+", re.I)
-_POINTS = frozenset({"position", "xtndpos", "jointpos"})
 _STRING = re.compile(r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\"")
 
 
@@ -70,7 +69,7 @@ class Pdl2Cloner(Cloner):
         if variable is None or variable.type is None:
             raise CloneError(f"{where.name} is not declared as a variable in this file")
         type_ = variable.type
-        if type_.name not in _POINTS or type_.array or type_.path:
+        if type_.name not in ast.POINTS or type_.array or type_.path:
             raise CloneError(f"{variable.name} is no single point")
         if variable.exported not in ("", program.name):
             raise CloneError(f"{variable.name} belongs to {variable.exported}")

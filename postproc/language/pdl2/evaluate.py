@@ -31,7 +31,7 @@ from postproc.language.pdl2.values import (
 
 _DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
-_POSITION_TYPES = frozenset({"position", "xtndpos", "jointpos", "vector"})
+_POSITION_TYPES = ast.POINTS | {"vector"}
 _FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
 
 
@@ -343,9 +343,7 @@ class Execution:
 
 # Whole records, arrays and nodes: what they hold is copied part by part.
 
-SINGLE = frozenset(
-    "integer real boolean string vector position jointpos xtndpos semaphore".split()
-)
+SINGLE = _POSITION_TYPES.union("integer real boolean string semaphore".split())
 
 
 def copy_parts(here: Execution, value: ir.Operand, target: ir.DataObject) -> bool:

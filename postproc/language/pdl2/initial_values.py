@@ -112,8 +112,7 @@ _KINDS = frozenset({"INT", "REA", "BOO", "STR", "AINT", "AREA", "ABOO", "ASTR"})
 
 def _is_point(type_: ast.Type | None) -> bool:
     """Tell whether a type holds positions and no more, in any number."""
-    points = ("position", "xtndpos", "jointpos", "vector")
-    return type_ is not None and (type_.path or type_.name in points)
+    return type_ is not None and (type_.path or type_.name in ast.POINTS | {"vector"})
 
 
 def _is_constant(world: World, key: str) -> bool:

@@ -44,7 +44,6 @@ from postproc.language.text.templates import number_in_order
 # all. Which lines are plain is told by the text alone, so that a block of them is the
 # same block each time that the analysis comes to it.
 
-_POINTS = ("position", "xtndpos", "jointpos")
 _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
 _WRITTEN, _ALONE = -1, -2  # instead of a row of the variable file
 
@@ -206,8 +205,8 @@ class BodyLines:
                 return True
             case ir.DataObject(name, ()):
                 type_ = self._world.type_of(self._place, name)
-                safe = type_ is None or (
-                    type_.name not in _POINTS and not type_.array and not type_.path
+                safe = type_ is None or not (
+                    type_.name in ast.POINTS or type_.array or type_.path
                 )
                 known = name.startswith("$") or name in self._parameters
                 return bare and safe and not known
@@ -216,7 +215,7 @@ class BodyLines:
 
 def _is_point(type_: ast.Type | None, array: bool) -> bool:
     """Tell whether a type is that of a point, or of an array of them."""
-    if type_ is None or type_.name not in _POINTS or type_.path:
+    if type_ is None or type_.name not in ast.POINTS or type_.path:
         return False
     return type_.array == array
 

@@ -11,6 +11,8 @@ from postproc.language.text.symbol_column import read_kinds
 NAMES = read_kinds(Path(__file__).with_name("names.txt"))
 """Words, and names of built-in routines and system variables, by what they do."""
 
+POINTS = frozenset({"position", "xtndpos", "jointpos"})
+
 # Statements that declare: programs, routines, variables, types.
 
 
