@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -39,6 +38,7 @@ from postproc.language.pdl2.values import (
     Nothing,
     Position,
     Value,
+    number_in,
     points_of,
 )
 
@@ -286,8 +286,9 @@ def frame_value(start: Start, record: Record, why: str) -> Position | Nothing:
     """Return a frame of the cell file as a value."""
     if record is None:
         return Nothing(why)
-    numbers, taught = tuple(float(n) for n in record), record in start.taught_records
-    return Position(False, numbers, derived="it stands in the cell file", taught=taught)
+    parts = tuple(WrittenNumber(float(n)) for n in record)
+    why, taught = "it stands in the cell file", record in start.taught_records
+    return Position(False, parts, derived=why, taught=taught)
 
 
 # Assignments: what a variable, a component or a setting holds afterwards.
@@ -348,13 +349,12 @@ def _setting(
     if isinstance(component, int):
         held = here.find_taught(here.store.settings.get(name, Position()))
         held = held if isinstance(held, Position) else Position()
-        part = WrittenNumber(value if isinstance(value, float) else math.nan)
-        held = held.with_component(component, part)
+        held = held.with_component(component, WrittenNumber(number_in(value)))
         value = replace(held, taught=held.taught or taught)
     else:
         here.world.pin(value, f"${name.upper()} is set to it")
         if isinstance(value, Position) and name in FRAMES:
-            value = replace(value, slots=(-1,) * 6, along=frozenset())
+            value = replace(value, parts=tuple(map(WrittenNumber, value.numbers)))
     if f"${name}" in here.world.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
@@ -388,7 +388,7 @@ def _with_part(held: Position, component: Component, value: Value) -> Value:
                 return value if known else Nothing("it is no position")
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
-            return held.with_aux(axis, value if isinstance(value, float) else None)
+            return held.with_aux(axis, number_in(value))
     return Nothing("a part of it known only at run time is assigned")
 
 

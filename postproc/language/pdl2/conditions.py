@@ -139,7 +139,7 @@ def _pose(value: Value | None) -> Pose:
     """Return a frame, () where it is not known."""
     if not isinstance(value, Position) or value.joints or not value.complete:
         return ()
-    return _pose_of(tuple(float(n) for n in value.numbers if n is not None))
+    return _pose_of(value.numbers)
 
 
 @lru_cache(maxsize=256)  # frames come back with every other setting

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -126,14 +127,14 @@ class Entries:
         """Return how an entry is written."""
         return self.layouts[int(self.layout[row])]
 
-    def numbers_of(self, row: int) -> tuple[float | None, ...]:
-        """Return the numbers of an entry, None where uninitialised or missing."""
-        return _numbers_or_none(self.numbers[row])
+    def numbers_of(self, row: int) -> tuple[float, ...]:
+        """Return the numbers of an entry, NaN where uninitialised or missing."""
+        return _with_one_nan(self.numbers[row])
 
-    def aux_of(self, row: int) -> tuple[tuple[int, float | None], ...]:
+    def aux_of(self, row: int) -> tuple[tuple[int, float], ...]:
         """Return the auxiliary axes of an entry, each with its value."""
         axes = self.layout_of(row).axes
-        return tuple(zip(axes, _numbers_or_none(self.aux[row]), strict=False))
+        return tuple(zip(axes, _with_one_nan(self.aux[row]), strict=False))
 
 
 _NO = np.empty(0, np.int32)
@@ -143,8 +144,9 @@ NO_ENTRIES = Entries(
 )  # fmt: skip
 
 
-def _numbers_or_none(values: Floats) -> tuple[float | None, ...]:
-    return tuple(None if value != value else value for value in values.tolist())
+def _with_one_nan(values: Floats) -> tuple[float, ...]:
+    """Return numbers that equal themselves."""
+    return tuple(math.nan if value != value else value for value in values.tolist())
 
 
 # From the lines of a variable file to its entries: one of each layout is read.

@@ -24,6 +24,7 @@ from postproc.language.pdl2.values import (
     Vector,
     add_unknown,
     invert_frame,
+    number_in,
     operate,
     part_of,
     shift_position,
@@ -82,10 +83,8 @@ class Execution:
     # ---- places ---------------------------------------------------------------------
     def integer(self, expression: ir.Operand) -> int | None:
         """Return a whole number, None where it is not known."""
-        value = self.value(expression)
-        if isinstance(value, float) and value.is_integer():
-            return int(value)
-        return None
+        value = self.real(expression)
+        return int(value) if value.is_integer() else None
 
     def locate(self, reference: ir.DataObject) -> Location:
         """Find what a reference means, as far as its indices are known."""
@@ -150,17 +149,16 @@ class Execution:
             return RUN_TIME if found.along else Nothing("the number cannot be read")
         return found.value
 
-    def real(self, expression: ir.Operand | None) -> float | None:
-        """Return a real number to compute with, None where it is not known."""
-        value = self.value(expression)
-        return value if isinstance(value, float) and math.isfinite(value) else None
+    def real(self, expression: ir.Operand | None) -> float:
+        """Return a real number to compute with, NaN where it is not known."""
+        return number_in(self.value(expression))
 
     def number(self, expression: ir.Operand | None) -> WrittenNumber:
         """Return a number, and where in the text it is written or comes from."""
         found = self.evaluate(expression)
-        if isinstance(found, float) and math.isfinite(found):
-            return WrittenNumber(found)
-        return found if isinstance(found, WrittenNumber) else WrittenNumber(math.nan)
+        if isinstance(found, WrittenNumber):
+            return found
+        return WrittenNumber(number_in(found))
 
     def evaluate(self, expression: ir.Operand | None) -> Value | WrittenNumber:
         """Return what an expression is worth, a number with where it comes from."""
@@ -203,9 +201,10 @@ class Execution:
         """Add to a value; a part of a position plus a constant moves along with it."""
         if not (isinstance(left, WrittenNumber) and left.along):
             return operate(sign, self._use(left), self.value(right))
-        value = self.real(right)
-        by = math.nan if value is None or abs(value) > FARTHEST else value
-        return replace(left, value=left.value + (by if sign == "+" else -by))
+        by = self.real(right)
+        value = left.value + (by if sign == "+" else -by)
+        known = abs(by) <= FARTHEST and not math.isnan(value)
+        return replace(left, value=value if known else math.nan)
 
     def answer_key(self, call: ir.FunctionCall) -> str:
         """Return where it is kept what a function of the job has returned."""
@@ -237,8 +236,8 @@ class Execution:
         at = target.number
         if at >= 0 and isinstance(held, Nothing):
             self.world.pin(held, "the program computes with a part of it")
-        if at >= 0 and isinstance(held, Position) and held.slots[at] >= 0:
-            return replace(held.number(at), along=True)
+        if at >= 0 and isinstance(held, Position) and held.parts[at].slot >= 0:
+            return replace(held.parts[at], along=True)
         return part_of(held, target.component)
 
     def _unsteady(self, target: Location) -> bool:
@@ -277,14 +276,8 @@ class Execution:
         return None, ()
 
     def _components(self, items: tuple[ir.Operand | None, ...]) -> Position:
-        parts = [*map(self.number, items)]
-        values = (part.value for part in parts)
-        return Position(
-            numbers=tuple(None if value != value else value for value in values),
-            slots=tuple(part.slot for part in parts),
-            along=frozenset(at for at, part in enumerate(parts) if part.along),
-            taught=any(map(self.takes_taught, items)),
-        )
+        parts = tuple(map(self.number, items))
+        return Position(parts=parts, taught=any(map(self.takes_taught, items)))
 
     def find_taught(self, value: Value) -> Value:
         """Return a value, as taught where it is a taught frame of the cell."""
@@ -333,9 +326,8 @@ class Execution:
                 return add_unknown(Nothing(why), self._components(arguments[:6]))
             config = text
         elif len(arguments) == 1 and self.real(arguments[0]) == 0.0:
-            return Position(
-                numbers=(0.0,) * 6, derived="its numbers are not written one by one"
-            )
+            why = "its numbers are not written one by one"
+            return Position(parts=(WrittenNumber(0.0),) * 6, derived=why)
         elif len(arguments) != 6:
             return Nothing("POS has not six numbers")
         return replace(self._components(arguments[:6]), config=config)

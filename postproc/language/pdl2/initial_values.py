@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
@@ -268,7 +269,7 @@ def _enter(world: World, file: VariableFile, row: int, key: str, arm: int) -> No
     """Enter a value that is no known point, where there is any, or another arm's."""
     entries, kind = file.entries, file.entries.layout_of(row).kind
     numbers, own = entries.numbers_of(row), int(entries.arm[row])
-    value: Value | None = numbers[0]
+    value: Value | None = None if math.isnan(numbers[0]) else numbers[0]
     if kind in POSITIONS:
         value = Nothing(
             f"its value is not initialised in {file.source.name}",

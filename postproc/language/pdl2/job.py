@@ -13,6 +13,7 @@ from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow
+from postproc.language.analysis.values import WrittenNumber
 from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
 from postproc.language.pdl2 import syntax as ast
@@ -89,12 +90,12 @@ class InitialValues:
     def position(self, row: int) -> Position:
         """Return the value of a point of the variable file."""
         entries, layout = self.entries, self.entries.layout_of(row)
-        slots = entries.slots[row].tolist()
+        places = entries.slots[row].tolist()
+        slots = [self.base + slot if slot >= 0 else -1 for slot in places]
+        parts = tuple(map(WrittenNumber, entries.numbers_of(row), slots))
         return Position(
-            layout.kind == "JNTP", entries.numbers_of(row),
-            tuple(self.base + slot if slot >= 0 else -1 for slot in slots),
-            layout.config, entries.aux_of(row), entries.name[row],
-            taught=bool(self.taught[row]), shared=bool(self.shared[row]),
+            layout.kind == "JNTP", parts, layout.config, entries.aux_of(row),
+            entries.name[row], bool(self.taught[row]), bool(self.shared[row]),
         )  # fmt: skip
 
     def find(self, key: str) -> Value | None:

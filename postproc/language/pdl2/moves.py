@@ -151,12 +151,11 @@ def _why(word: str) -> Reason:
     return Reason(Code.NO_TARGET, f"the move holds no target of its own ({word})")
 
 
-def _no_target(target: Meaning, numbers: Sequence[float | None], word: str) -> Pdl2Goal:
+def _no_target(target: Meaning, numbers: Sequence[float], word: str) -> Pdl2Goal:
     """Return a goal that can be planned only where all its numbers are known."""
-    known = [x for x in numbers if x is not None]
-    if len(known) < len(numbers):
+    if any(map(math.isnan, numbers)):
         return Pdl2Goal(Meaning.UNKNOWN, why=_why(word))
-    return Pdl2Goal(target, (*known, *UNKNOWN[len(known) :]), why=_why(word))
+    return Pdl2Goal(target, (*numbers, *UNKNOWN[len(numbers) :]), why=_why(word))
 
 
 def _short_of(
@@ -171,7 +170,7 @@ def _short_of(
     goal, distance = absolute(here, place), here.real(by)
     if goal.target is not Meaning.POSE or not known:
         return Pdl2Goal(Meaning.UNKNOWN, why=_why(target.name))
-    if distance is None or distance < least:
+    if not distance >= least:
         return Pdl2Goal(Meaning.UNKNOWN, why=_why(target.name))
     return replace(
         goal, target=target, slots=NO_SLOTS, follows=goal.origin, name="",
@@ -236,7 +235,7 @@ def from_value(value: Value, system: bool = False) -> Pdl2Goal:
     if not isinstance(value, Position):
         return Pdl2Goal(Meaning.UNKNOWN, why=NO_POSITION)
     target = Meaning.JOINTS if value.joints else Meaning.POSE
-    numbers = tuple(x for x in value.numbers if x is not None)
+    numbers = value.numbers
     if not value.complete:
         target, numbers, reason = Meaning.UNKNOWN, UNKNOWN, IN_PART
     elif value.derived:
@@ -249,7 +248,7 @@ def from_value(value: Value, system: bool = False) -> Pdl2Goal:
     slots, own = value.slots, value.complete and value.editable
     along = not own and target is Meaning.POSE and -1 not in slots
     axes = None if value.aux is None else tuple([axis for axis, _ in value.aux])
-    given = {axis: x for axis, x in value.aux or () if x is not None}
+    given = {axis: x for axis, x in value.aux or () if not math.isnan(x)}
     aux = NO_AXES
     if given:
         aux = tuple([given.get(axis, math.nan) for axis in range(1, MOST_AXES + 1)])

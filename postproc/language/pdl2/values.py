@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,10 +15,11 @@ from postproc.language.analysis.values import (
 )
 from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
-Numbers = tuple[float | None, ...]
-
 FARTHEST = 1e6  # [mm] and [deg]: beyond, rounding would hide what is added
 COMPONENTS = {"x": 0, "y": 1, "z": 2, "a": 3, "e": 4, "r": 5}
+
+
+UNKNOWN = WrittenNumber(math.nan)  # no other NaN is a value: it equals itself alone
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +52,9 @@ def points_of(arm: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Vector:
-    """A VECTOR, [mm] where it is a place."""
+    """A VECTOR, [mm] where it is a place, NaN where unknown."""
 
-    numbers: tuple[float | None, float | None, float | None]
+    numbers: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,54 +63,50 @@ class Position:
 
     Attributes:
         joints: The numbers are joint angles [deg], not x, y, z [mm], a, e, r [deg].
-        numbers: Six numbers, None where unknown.
-        slots: Global index of the number that holds each component, or that it moves
-            along with; -1 for none.
+        parts: Six numbers.
         config: Configuration string, None where none was written.
-        aux: (axis, value) of auxiliary axes; None where they are not known.
+        aux: (axis, value) of auxiliary axes, NaN where unknown; None where all are.
         name: Variable or array element, "" for an inline literal.
         taught: Marked as taught with the robot.
         shared: Another program may read it too.
         derived: Why the numbers cannot be edited, "" where they can.
-        along: Components that are the number of their slot plus a constant.
     """
 
     joints: bool = False
-    numbers: Numbers = (None,) * 6
-    slots: tuple[int, ...] = (-1,) * 6
+    parts: tuple[WrittenNumber, ...] = (UNKNOWN,) * 6
     config: str | None = None
-    aux: tuple[tuple[int, float | None], ...] | None = ()
+    aux: tuple[tuple[int, float], ...] | None = ()
     name: str = ""
     taught: bool = False
     shared: bool = False
     derived: str = ""
-    along: frozenset[int] = frozenset()
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The values of the six numbers."""
+        return tuple([one.value for one in self.parts])
+
+    @property
+    def slots(self) -> tuple[int, ...]:
+        """Where they are written."""
+        return tuple([one.slot for one in self.parts])
 
     @property
     def complete(self) -> bool:
         """Tell whether all six numbers are known."""
-        return None not in self.numbers
+        return not any(map(math.isnan, self.numbers))
 
     @property
     def editable(self) -> bool:
         """Tell whether every number stands in a text by itself."""
-        return not (self.derived or self.along) and -1 not in self.slots
-
-    def number(self, at: int) -> WrittenNumber:
-        """Return a component."""
-        value = self.numbers[at]
-        known = math.nan if value is None else value
-        return WrittenNumber(known, self.slots[at], at in self.along)
+        alone = all(one.slot >= 0 and not one.along for one in self.parts)
+        return alone and not self.derived
 
     def with_component(self, at: int, new: WrittenNumber) -> Position:
         """Return a copy with one component replaced."""
-        numbers, slots = list(self.numbers), list(self.slots)
-        numbers[at] = None if math.isnan(new.value) else new.value
-        slots[at] = new.slot
-        along = self.along | {at} if new.along else self.along - {at}
-        return replace(self, numbers=tuple(numbers), slots=tuple(slots), along=along)
+        return replace(self, parts=(*self.parts[:at], new, *self.parts[at + 1 :]))
 
-    def with_aux(self, axis: int, value: float | None) -> Position:
+    def with_aux(self, axis: int, value: float) -> Position:
         """Return a copy with one auxiliary axis set."""
         if self.aux is None:
             return self
@@ -155,6 +151,11 @@ class Location:
 Value = float | bool | str | Position | Vector | Location | Nothing
 
 
+def number_in(found: Value) -> float:
+    """Return a number, NaN where there is none."""
+    return found if isinstance(found, float) and math.isfinite(found) else math.nan
+
+
 def join(a: Value, b: Value) -> Value:
     """Return what holds when one of two values holds."""
     if a is b or (type(a) is type(b) and a == b):
@@ -166,8 +167,7 @@ def join(a: Value, b: Value) -> Value:
     if isinstance(a, Location) and isinstance(b, Location):
         return Location(a.keys | b.keys, False)
     if isinstance(a, Position) and isinstance(b, Position):
-        fields = ("joints", "numbers", "slots", "along", "config")
-        if all(getattr(a, name) == getattr(b, name) for name in fields):
+        if (a.joints, a.parts, a.config) == (b.joints, b.parts, b.config):
             return _mix(a, b)
     return add_unknown(Nothing("it may hold different values here"), a, b)
 
@@ -196,12 +196,11 @@ def join_components(a: Value, b: Value) -> Value:
         return join(a, b)
     if (a.joints, a.config) != (b.joints, b.config):
         return join(a, b)
-    other = {at for at in range(6) if a.number(at) != b.number(at)}
-    if all(at in other or a.numbers[at] is None for at in range(6)):
+    pairs = zip(a.parts, b.parts, strict=True)
+    parts = tuple([one if one == other else UNKNOWN for one, other in pairs])
+    if all(math.isnan(one.value) for one in parts):
         return join(a, b)
-    for at in other:
-        a = a.with_component(at, WrittenNumber(math.nan))
-    return _mix(a, b)
+    return _mix(replace(a, parts=parts), b)
 
 
 def _mix(a: Position, b: Position) -> Position:
@@ -235,35 +234,31 @@ def invert_frame(a: Position) -> Value:
 
 def shift_position(a: Position, by: Vector) -> Value:
     """Return a position moved along its reference frame's axes (POS_SHIFT)."""
-    if a.joints or not a.complete or None in by.numbers:
+    if a.joints or not a.complete or any(map(math.isnan, by.numbers)):
         return add_unknown(Nothing("an argument of POS_SHIFT is not known"), a)
-    moved = tuple(
-        n + d  # type: ignore[operator]
-        for n, d in zip(a.numbers[:3], by.numbers, strict=True)
-    )
-    if max(map(abs, moved)) > FARTHEST:
+    moved = [
+        WrittenNumber(one.value + d, one.slot, True)
+        for one, d in zip(a.parts, by.numbers, strict=False)
+    ]
+    if max(abs(one.value) for one in moved) > FARTHEST:
         return add_unknown(Nothing("POS_SHIFT takes it out of any reach"), a)
-    return replace(
-        a,
-        numbers=moved + a.numbers[3:],
-        along=a.along | {0, 1, 2},
-        derived="it is shifted by the program (POS_SHIFT)",
-    )
+    why = "it is shifted by the program (POS_SHIFT)"
+    return replace(a, parts=(*moved, *a.parts[3:]), derived=why)
 
 
 def _array(position: Position) -> np.ndarray:
-    return np.array(position.numbers, dtype=float)
+    return np.array(position.numbers)
 
 
 def _derive_position(
     pose: np.ndarray,
     config: str | None,
     why: str,
-    aux: tuple[tuple[int, float | None], ...] | None,
+    aux: tuple[tuple[int, float], ...] | None,
     taught: bool,
 ) -> Position:
-    numbers = tuple(record_from_pose(pose).tolist())
-    return Position(False, numbers, config=config, aux=aux, derived=why, taught=taught)
+    parts = tuple(map(WrittenNumber, record_from_pose(pose).tolist()))
+    return Position(False, parts, config=config, aux=aux, derived=why, taught=taught)
 
 
 # Operators on values as far as they are known.
@@ -278,15 +273,15 @@ def part_of(held: Value, component: Component) -> Value:
     """Return a component of a position or vector."""
     if not isinstance(held, Position | Vector):
         return held if isinstance(held, Nothing) else RUN_TIME
-    number: float | None = None
+    number = math.nan
     match component:
         case "pos" if isinstance(held, Position):
             return replace(held, aux=())
         case ("aux", axis) if isinstance(held, Position) and held.aux is not None:
-            number = dict(held.aux).get(axis)
+            number = dict(held.aux).get(axis, math.nan)
         case int(at) if at < len(held.numbers):
             number = held.numbers[at]
-    return RUN_TIME if number is None else number
+    return RUN_TIME if math.isnan(number) else number
 
 
 def operate(sign: str, *parts: Value) -> Value:
@@ -296,21 +291,17 @@ def operate(sign: str, *parts: Value) -> Value:
         case ":", (Position() as a, Position() as b):
             return compose_frames(a, b)
         case "+" | "-", _ if len(vectors) == len(parts):
-            x, y, z = (_number(sign, one) for one in zip(*vectors, strict=True))
+            x, y, z = (apply_operator(sign, one) for one in zip(*vectors, strict=True))
             return RUN_TIME if math.isnan(x + y + z) else Vector((x, y, z))
         case _, (str(), str()) if sign in COMPARISONS:
             return COMPARISONS[sign](*parts)  # type: ignore[arg-type]
     compares = sign in COMPARISONS
     truths = sign in _LOGICAL or (compares and isinstance(parts[0], bool))
     kind = bool if truths else float
-    numbers = [float(one) if type(one) is kind else None for one in parts]
-    found = _number(sign, numbers)
+    numbers = [float(one) if type(one) is kind else math.nan for one in parts]
+    found = apply_operator(sign, numbers)
     if not math.isnan(found):
         return bool(found) if truths or compares else found
-    if None not in numbers and sign in ("/", "DIV", "MOD"):
+    if sign in ("/", "DIV", "MOD") and not any(map(math.isnan, numbers)):
         return _NO_RESULT
     return next((v for v in parts if isinstance(v, Nothing)), RUN_TIME)
-
-
-def _number(sign: str, parts: Sequence[float | None]) -> float:
-    return apply_operator(sign, [math.nan if one is None else one for one in parts])
