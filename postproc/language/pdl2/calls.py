@@ -68,8 +68,8 @@ def summarise_call(
     take_effects(
         here, reach.parts, f"{name} may compute with it", f"{name} may change it"
     )
-    for part in reach.parts:
-        list_moves(machine, here, part.place, name)
+    for place, _ in reach.parts:
+        list_moves(machine, here, place, name)
     if reach.frames:
         here.store.forget_frames(f"a routine that {name} calls sets it")
     if reach.moves:
@@ -80,10 +80,10 @@ def take_effects(
     here: Execution, parts: Sequence[side_effects.LiveRows], computes: str, changes: str
 ) -> None:
     """Take in what rows do to variables that are not followed, and say so."""
-    for part in parts:
-        within = Execution(here.world, part.place, here.row, here.store)
-        escape_names(within, part.effects.read, computes)
-        invalidate_names(within, part.effects.assigned, changes)
+    for place, own in parts:
+        within = Execution(here.world, place, here.row, here.store)
+        escape_names(within, own.read, computes)
+        invalidate_names(within, own.assigned, changes)
 
 
 def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:

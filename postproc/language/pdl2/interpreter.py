@@ -111,9 +111,8 @@ class Pdl2Machine(Machine):
         place, key = at.place, self.world.root(at.place, loop.name)
         inside = list_live(self.world, place, at.row + 1, place.flow.end[at.row])
         return loop.name not in self.world.volatile and not any(
-            loop.name in part.effects.assigned
-            and self.world.root(part.place, loop.name) == key
-            for part in inside
+            loop.name in own.assigned and self.world.root(other, loop.name) == key
+            for other, own in inside
         )
 
     def say_not_unrolled(self, at: At, rounds: int) -> None:
@@ -386,9 +385,9 @@ def _handlers(machine: Machine, store: Store) -> None:
         for first, last in place.flow.conditions:
             reach = live_rows(world, place, first, last)
             world.volatile |= reach.may_change
-            for part in reach.parts:
-                for name in part.effects.read:
-                    root = world.root(part.place, name)
+            for other, own in reach.parts:
+                for name in own.read:
+                    root = world.root(other, name)
                     world.loosen(root, "a condition handler may use it")
             if reach.moves:
                 _moving_handler(machine, place, first, unknown)
@@ -401,7 +400,7 @@ def _handlers(machine: Machine, store: Store) -> None:
 
 def _ends_ours(world: World, place: Place, first: int, reach: CallGraph) -> bool:
     """Return True if a handler may end moves of our arm."""
-    if any(part.effects.cancels for part in reach.parts[1:]):
+    if any(own.cancels for _, own in reach.parts[1:]):
         return True
     for row in range(first, place.flow.end[first]):
         action = ast.action(place.program.lines.statement(row))

@@ -210,7 +210,6 @@ class World:
     volatile: frozenset[str] = frozenset()
     _said: set[tuple[str, str]] = field(default_factory=set)
     _kept: set[frozenset[int]] = field(default_factory=set)
-    _first: dict[str, list[str]] | None = None
     _later: tuple[int, dict[str, list[str]]] | None = None
 
     def __post_init__(self) -> None:
@@ -292,10 +291,12 @@ class World:
         taught, name = self.start.taught, name.lower()
         return bool(taught) and (name in taught or base_variable(name) in taught)
 
+    @cached_property
+    def _first(self) -> Mapping[str, list[str]]:
+        return _by_whole(self.initial.parts())
+
     def first_parts(self, key: str) -> list[str]:
         """Return the elements and fields that a key has when the job starts."""
-        if self._first is None:
-            self._first = _by_whole(self.initial.parts())
         return self._first.get(key, [])
 
     def later_parts(self, key: str) -> list[str]:

@@ -137,11 +137,6 @@ class Variables(Mapping[str, Variable]):
         self._begins.append(begin)
         self._said.append(said)
 
-    def declare_all(self, others: Variables) -> None:
-        """Enter all variables of others behind the own ones."""
-        for variable in others.values():
-            self.declare([variable.name], variable)
-
     def some(self, names: Iterable[str]) -> Variables:
         """Return those of some lower-case names that there are."""
         found = Variables()
@@ -402,7 +397,8 @@ class _Reader:
         """Take a routine that turns out to have no body of its own as declared."""
         scope = self.scopes.pop()
         self.scopes[-1].begin = scope.begin
-        self.scopes[-1].variables.declare_all(scope.variables)
+        for one in scope.variables.values():
+            self.scopes[-1].variables.declare([one.name], one)
 
     def close(self, last: int) -> None:
         """End the innermost routine, or the program."""

@@ -176,17 +176,8 @@ def _name_assigned(reference: ir.DataObject) -> str:
 # What a call or a handler may do, through all files of the job.
 
 
-@dataclass(frozen=True)
-class LiveRows:
-    """Rows that may run: those of one body, or some of them.
-
-    Attributes:
-        place: Where they stand.
-        effects: What they may do themselves; what they call are parts of their own.
-    """
-
-    place: Place
-    effects: Effects
+LiveRows = tuple[Place, Effects]
+"""Where rows stand that may run, and what they do; what they call are others."""
 
 
 @dataclass(frozen=True)
@@ -206,12 +197,12 @@ class CallGraph:
     @property
     def cancels(self) -> frozenset[ir.SourceStatement]:
         """Statements that end moves on their way."""
-        return frozenset().union(*(part.effects.cancels for part in self.parts))
+        return frozenset().union(*(own.cancels for _, own in self.parts))
 
     @property
     def may_change(self) -> frozenset[str]:
         """Names of variables and settings (with ``$``) that may change."""
-        names = frozenset().union(*(part.effects.assigned for part in self.parts))
+        names = frozenset().union(*(own.assigned for _, own in self.parts))
         return names | {f"${frame}" for frame in FRAMES if self.frames}
 
 
@@ -228,10 +219,10 @@ def call_graph_of(world: World, place: Place) -> CallGraph:
 def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     """Tell what rows first to last - 1 of a body may do, and all that they call."""
     parts = list_live(world, place, first, last)
-    outside = {effect for part in parts for effect in _outside(world, part)}
+    outside = {effect for part in parts for effect in _outside(world, *part)}
     moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
     frames = {RoutineEffect.SETS_FRAMES, RoutineEffect.TABLE, RoutineEffect.UNKNOWN}
-    moving = any(part.effects.moves for part in parts) or bool(outside & moves)
+    moving = any(own.moves for _, own in parts) or bool(outside & moves)
     return CallGraph(parts, moving, bool(outside & frames))
 
 
@@ -239,7 +230,7 @@ def list_live(
     world: World, place: Place, first: int, last: int
 ) -> tuple[LiveRows, ...]:
     """Follow rows first to last - 1 of a body into all that they call."""
-    parts = [LiveRows(place, rows_effects(place.program, first, last))]
+    parts = [(place, rows_effects(place.program, first, last))]
     whole = (first, last) == (place.body.first, place.body.last)
     for one in reach(
         _list_called(world, place, first, last),
@@ -248,19 +239,19 @@ def list_live(
     ):
         if not (whole and one.body is place.body):  # else its rest may be called, too
             rows = (one.body.first, one.body.last)
-            parts.append(LiveRows(one, rows_effects(one.program, *rows)))
+            parts.append((one, rows_effects(one.program, *rows)))
     return tuple(parts)
 
 
-def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
+def _outside(world: World, place: Place, own: Effects) -> Iterator[RoutineEffect]:
     """Yield what the routines do that some rows call and the job does not hold."""
-    program = part.place.program
-    for name in sorted(part.effects.calls):
+    program = place.program
+    for name in sorted(own.calls):
         inside = world.find_routine(program, name) or world.find_program(program, name)
         if inside is None:
             effect = effect_of(world, program, name)
             if effect is RoutineEffect.UNKNOWN:
-                report_unknown_routine(world, program, part.place.body.first, name)
+                report_unknown_routine(world, program, place.body.first, name)
             yield effect
 
 
