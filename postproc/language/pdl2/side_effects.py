@@ -138,7 +138,7 @@ _END = ir.Leave("exitcycle")
 @lru_cache(maxsize=8192)
 def _direct(statement: ir.SourceStatement) -> Effects:
     chain, calls, assigned = [statement], ir.calls_in(statement), set[str]()
-    while (then := ast.behind(chain[-1])) is not None:
+    while (then := getattr(chain[-1], "then", None)) is not None:
         chain.append(then)
     called = {call.name for call in calls}
     changed = [a for call in calls if call.name not in PURE for a in call.values]

@@ -156,18 +156,8 @@ class When(ir.SourceStatement):
     terms: tuple[ir.DataObject | ir.FunctionCall, ...] = ()
 
 
-def behind(one: ir.SourceStatement | None) -> ir.SourceStatement | None:
-    """Return what follows a label, a CASE, an ELSE or a WHEN on its line, if anything.
-
-    None as well for all other statements.
-    """
-    if isinstance(one, ir.LabelMark | When | ir.BlockWord | ir.Branch):
-        return one.then
-    return None
-
-
 def action(statement: ir.SourceStatement | None) -> ir.SourceStatement | None:
     """Return what a line does behind its label, CASE, ELSE or WHEN, if anything."""
     while isinstance(statement, ir.LabelMark | When) or ir.divides(statement):
-        statement = behind(statement)
+        statement = getattr(statement, "then", None)
     return statement

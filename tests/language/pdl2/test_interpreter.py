@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from postproc.language.language import JobReading, Start
-from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.machine import Machine
 from postproc.language.pdl2.program import Program, parse
@@ -384,7 +383,7 @@ def test_calls_are_looked_for_in_statements_of_the_program_alone(
         asked.append(statement)
         own = place.program.lines.said
         lines = [own[k] for k in range(len(own))]
-        parts = [ast.behind(one) for one in lines]
+        parts = [getattr(one, "then", None) for one in lines]
         assert any(statement is one for one in (*lines, *parts))
         return find(self, place, statement)
 
