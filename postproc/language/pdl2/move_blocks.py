@@ -256,6 +256,10 @@ class MoveBlocks:
         block = self._written.get(first)
         if block is None or block.modes is not here.store.settings:
             block = self._read(here, lines, end)
+            own = slice(first[1] - lines.first, end - lines.first)
+            calls = not lines.calls.isdisjoint(lines.variant[own].tolist())
+            if not calls and (lines.goal[own] < 0).all():
+                self._written[first] = block
         # Moves to written numbers are the same ones again under the same settings:
         # what differs is where the arm comes from.
         come = self.machine.predecessors(here)

@@ -207,3 +207,37 @@ def test_a_file_of_one_point_stands_beside_points_that_are_assigned() -> None:
     variables = read_variables(source_from_bytes("a.lsv", values))
     found = resolve(parse(source_from_bytes("a.pdl", text.encode())), None, variables)
     assert found.visits.target.values[:, 0].tolist() == [9, 0, 9, 1, 2, 9]
+
+
+ROUNDS = """PROGRAM job
+VAR i : INTEGER
+  p : POSITION
+BEGIN
+p := POS(1, 2, 3, 4, 5, 6, '')
+FOR i := 1 TO 9 DO
+{}
+ENDFOR
+END job"""
+INLINE = [f"MOVE LINEAR TO POS({k}, 2, 3, 4, 5, 6, '')" for k in range(5)]
+
+
+@pytest.mark.parametrize(
+    ("more", "reads"), [("", 1), ("spot(1, 2, FALSE)", 9), ("MOVE LINEAR TO p", 9)]
+)
+def test_a_block_of_written_moves_is_read_once_in_all_rounds(
+    more: str, reads: int, monkeypatch: pytest.MonkeyPatch
+):
+    read, blocks = MoveBlocks._read, []
+
+    def note(self, *given):
+        blocks.append(read(self, *given))
+        return blocks[-1]
+
+    monkeypatch.setattr(MoveBlocks, "_read", note)
+    text = ROUNDS.format("\n".join([*INLINE, more, *INLINE]))
+    found = resolve(parse(source_from_bytes("job.pdl", text.encode()))).visits
+    assert len(blocks) == reads
+    assert len(found) == 9 * (10 + more.startswith("MOVE"))
+    assert found.target.values[:5, 0].tolist() == [0, 1, 2, 3, 4]
+    before = [found.graph.predecessors(k).tolist() for k in range(1, len(found))]
+    assert before == [[k - 1] for k in range(1, len(found))]
