@@ -10,7 +10,7 @@ import signal
 import stat
 import threading
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -386,7 +386,8 @@ class FolderListing:
         self.root = root
         self._entries: dict[Path, tuple[Path, ...]] = {}
         self._named: dict[Path, dict[str, Path]] = {}
-        self._below: dict[tuple[Path, tuple[str, ...]], tuple[Path, ...]] = {}
+        self._ending: dict[tuple[Path, tuple[str, ...], bool], tuple[Path, ...]] = {}
+        self._found: dict[tuple[Path, object], Sequence[Path]] = {}
 
     def entries(self, folder: Path) -> tuple[Path, ...]:
         """Return what a folder holds, in order; nothing where it is none."""
@@ -412,14 +413,26 @@ class FolderListing:
             suffixes: In lower case.
             below: Those of all folders below it, too.
         """
-        if not below:
-            own = (p for p in self.entries(folder) if p.suffix.lower() in suffixes)
-            return tuple(p for p in own if p.is_file())
-        key = folder, suffixes
-        if key not in self._below:
-            found = (p for p in folder.rglob("*.*") if p.suffix.lower() in suffixes)
-            self._below[key] = tuple(p for p in sorted(found) if p.is_file())
-        return self._below[key]
+        key = folder, suffixes, below
+        if key not in self._ending:
+            every = sorted(folder.rglob("*.*")) if below else self.entries(folder)
+            found = (path for path in every if path.suffix.lower() in suffixes)
+            self._ending[key] = tuple(filter(Path.is_file, found))
+        return self._ending[key]
+
+    def once(
+        self, folder: Path, find: Callable[[Path, FolderListing], Sequence[Path]]
+    ) -> Sequence[Path]:
+        """Return what is found for all programs of a folder alike.
+
+        Args:
+            folder: The folder.
+            find: Finds it; it is asked once.
+        """
+        key = folder, find
+        if key not in self._found:
+            self._found[key] = find(folder, self)
+        return self._found[key]
 
 
 # Reading files and streams that somebody else has made.

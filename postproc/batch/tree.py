@@ -78,11 +78,10 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
     listing = FolderListing(root.absolute())
     found = [_sort(root, names, plan, listing) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
-    # What a program reads and is not rewritten beside it: other tasks have programs.
-    read = [
-        (place, PurePosixPath(unit.program)) for unit in units for place in unit.reads
-    ]
-    only_read = {place for place, by in read if not file_named(place).runs_beside(by)}
+    only_read = {
+        place for unit in units for place in unit.reads
+        if not _is_program_by_itself(place, PurePosixPath(unit.program))
+    }  # fmt: skip
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
     units = [unit for unit in units if unit.program not in only_read]
     # The largest first: no worker is left alone with one at the end.
@@ -95,6 +94,11 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
         tuple(note for part in found for note in part.notes),
         sum(sizes.values()),
     )
+
+
+def _is_program_by_itself(place: str, by: PurePosixPath) -> bool:
+    """Tell whether a file that a program reads is rewritten as another one."""
+    return file_named(file_named(place).name_for(by)).is_apart
 
 
 def _walk(root: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:

@@ -162,6 +162,10 @@ class FileName:
         """
         return PurePath(self.place).name
 
-    def runs_beside(self, program: PurePath) -> bool:
-        """Tell whether it belongs to another task of a backup than a program."""
+    @property
+    def is_apart(self) -> bool:
+        """Tell by its name in a job whether it is a program by itself.
+
+        A job may read such a one for what it does to shared data.
+        """
         return False
