@@ -14,7 +14,7 @@ from postproc.language.file_name import FileName, Named, Skip
 from postproc.language.measuring_program import is_measuring_program
 
 SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
-OTHER_TASKS = "TASKS/"
+OTHER_TASKS, OTHER_MODULES = "TASKS/", "MODULES/"
 _MAIN = re.compile(
     rb"^[ \t]*(?:LOCAL[ \t]+)?PROC[ \t]+main[ \t]*\(", re.IGNORECASE | re.MULTILINE
 )
@@ -23,8 +23,8 @@ _MAIN = re.compile(
 class RapidFileName(FileName):
     """A file by its name, as RAPID takes it: every module belongs to those beside it.
 
-    Files that a job has from other folders of a backup have names with a folder: of
-    its system modules, or of another task.
+    Files that a job has from elsewhere have names with a folder: system modules of a
+    backup, modules of other tasks, and modules beside it that do not belong to it.
     """
 
     programs: ClassVar = (".mod", ".modx", ".prg", *SYSTEM_SUFFIXES)
@@ -32,7 +32,16 @@ class RapidFileName(FileName):
     @property
     def is_from_elsewhere(self) -> bool:
         """Tell by the folder that its name begins with."""
-        return self.place.startswith((SYSTEM_MODULES, OTHER_TASKS))
+        return self.place.startswith((SYSTEM_MODULES, OTHER_TASKS, OTHER_MODULES))
+
+    @property
+    def is_apart(self) -> bool:
+        """Tell whether it is read for what it changes, and is no part of the task.
+
+        >>> RapidFileName("MODULES/job.mod").is_apart
+        True
+        """
+        return self.place.startswith((OTHER_TASKS, OTHER_MODULES))
 
     @property
     def is_named_as_system(self) -> bool:
@@ -84,15 +93,15 @@ class RapidFileName(FileName):
         'SYSMOD/user.sys'
         >>> RapidFileName("RAPID/TASK2/PROGMOD/plc.mod").name_for(job)
         'TASKS/TASK2/PROGMOD/plc.mod'
+        >>> RapidFileName("RAPID/TASK1/PROGMOD/set.mod").name_for(job)
+        'MODULES/set.mod'
         """
         path = PurePath(self.place)
-        if self.runs_beside(program):
+        if path.parent.parent != program.parent.parent:
             return OTHER_TASKS + "/".join(path.parts[-3:])
+        if path.parent == program.parent:
+            return f"{OTHER_MODULES}{path.name}"
         return f"{SYSTEM_MODULES}{path.name}"
-
-    def runs_beside(self, program: PurePath) -> bool:
-        """Tell by the folders of tasks."""
-        return PurePath(self.place).parent.parent != program.parent.parent
 
 
 FILES = RapidFileName

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Container, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -13,6 +13,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.move_blocks import TargetSlots
+from postproc.language.analysis.shared_changes import SharedChange, collect_changes
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import (
@@ -68,7 +69,6 @@ RECORDS: Mapping[str, Layout] = {
 """Components of data by type."""
 COUNTS: tuple[tuple[int, ...], ...] = ((3, 4, 4, 6), (6, 6))
 """How many numbers stand in the parts of a robtarget, and of a jointtarget."""
-_READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
 
 
 @dataclass
@@ -85,6 +85,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     followed = (*RECORDS, "num", "bool")
     targets = ("robtarget", "jointtarget")
     functions = "func"
+    still_words = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
     controller_data = staticmethod(read_controller_data)
     frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
     conditions: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = (
@@ -156,7 +157,8 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     def note_odd(self, uses: NamesUsed) -> None:
         """Note words of what is not understood; but a move sets nothing."""
-        uses.changed |= self.words_of_odd(_READING_MOVES)
+        uses.changed |= self.words_of_odd(self.still_words)
+        uses.written |= self.changed_elsewhere.keys()
         uses.read |= self.odd_words
 
     def bind(
@@ -166,14 +168,31 @@ class RapidTask(TaskSymbols[RapidFile]):
         bound = super().bind(routine, call, there)
         return self.scope_of(routine) if self.sets_by_string and bound else bound
 
+    # What other modules do of the same task, or what ran before it.
+
+    @cached_property
+    def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
+        """What other modules change of the data that they share, by name."""
+        data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        shared = {
+            one.name for k, one in data
+            if one.kind != "const" and not one.routine and self.shares(k, one)
+        }  # fmt: skip
+        files = (one for one in self.files_beside if not _task_of(one))
+        others = [RapidTask([file]) for file in files]
+        found = dict(collect_changes(others, shared))
+        for change in (change for one in others for change in one.changes_by_string):
+            found |= {name: [change, *found.get(name, ())] for name in shared}
+        return found
+
     # What other tasks do: global persistents of one name are the same data.
 
     @cached_property
     def others(self) -> Sequence[RapidTask]:
         """The tasks that run at the same time, by the names of their files."""
         tasks = defaultdict[str, list[RapidFile]](list)
-        for file in self.files_beside:
-            tasks[RapidFileName(file.text.source.name).task_beside].append(file)
+        for file in filter(_task_of, self.files_beside):
+            tasks[_task_of(file)].append(file)
         return [RapidTask(own) for own in tasks.values()]
 
     def is_changed_beside(self, file: int, datum: Datum) -> bool:
@@ -230,7 +249,14 @@ class RapidTask(TaskSymbols[RapidFile]):
     @cached_property
     def sets_by_string(self) -> bool:
         """Whether an instruction sets data that it is given the names of in texts."""
-        return bool(BY_STRING & self.find_calls)
+        return any(self.changes_by_string)
+
+    @property
+    def changes_by_string(self) -> Iterator[SharedChange]:
+        """Where those stand."""
+        for text in (file.text for file in self.files):
+            for row in text.of_kind(_sets_by_string):
+                yield SharedChange("", (), text.source.name, text.line(row))
 
     @cached_property
     def calls_by_text(self) -> bool:
@@ -288,6 +314,17 @@ class RapidTask(TaskSymbols[RapidFile]):
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)
+
+
+def _sets_by_string(one: ir.SourceStatement) -> bool:
+    """Return True if a statement sets data by a name in a text."""
+    one = ir.inside(one)
+    return isinstance(one, ir.Instruction) and one.name in BY_STRING
+
+
+def _task_of(file: RapidFile) -> str:
+    """Return the task that a file belongs to which runs beside, "" for none."""
+    return RapidFileName(file.text.source.name).task_beside
 
 
 def _is_shared(datum: Datum) -> bool:
