@@ -23,10 +23,16 @@ RAPID = {
     "ENDMODULE\n",
 }  # fmt: skip
 
+PDL2 = {
+    "a.pdl": "PROGRAM a\nVAR f : POSITION EXPORTED FROM b\nBEGIN\nf.X := 5\nEND a\n",
+    "b.pdl": "PROGRAM b\nVAR f : POSITION EXPORTED FROM b\nBEGIN\nMOVE TO f\nEND b\n",
+}
+
 
 @pytest.mark.parametrize(
     ("files", "programs"),
-    [(KRL, ("R1/Program/a.src", "R1/Program/b.src")),
+    [(PDL2, ("a.pdl", "b.pdl")),
+     (KRL, ("R1/Program/a.src", "R1/Program/b.src")),
      (RAPID, ("a.mod", "b.mod"))],
 )  # fmt: skip
 def test_a_program_that_others_read_is_compensated(tmp_path, files, programs):

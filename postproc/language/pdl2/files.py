@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import PurePath
 from typing import ClassVar
 
 from postproc import _native
@@ -16,6 +17,7 @@ _NAMED = re.compile(
     rb"|CALL[ \t]+(?P<called>\w+))",
     re.IGNORECASE | re.MULTILINE,
 )
+OTHER_PROGRAMS = "PROGRAMS/"
 _OUTSIDE = re.compile(r"[/\\:\0]|^\.*$")  # folders, drives, ``..``
 _PROGRAM_ARM = re.compile(
     rb"^[ \t]*PROGRAM\b[^\r\n]*?\bPROG_ARM[ \t]*=[ \t]*(\d{1,9})\b",
@@ -63,6 +65,24 @@ class Pdl2FileName(FileName):
             else:
                 inside.setdefault(base_name(name), line)
         return inside, outside
+
+    def name_for(self, program: PurePath) -> str:
+        """Return its name in a job: that of another program, which it does not name.
+
+        >>> Pdl2FileName("b.pdl").name_for(PurePath("a.pdl"))
+        'PROGRAMS/b.pdl'
+        """
+        return f"{OTHER_PROGRAMS}{PurePath(self.place).name}"
+
+    @property
+    def is_from_elsewhere(self) -> bool:
+        """Tell whether it is the name of another program that changes variables."""
+        return self.is_apart
+
+    @property
+    def is_apart(self) -> bool:
+        """Tell by the folder that its name begins with."""
+        return self.place.startswith(OTHER_PROGRAMS)
 
     def arm(self, head: bytes) -> int:
         r"""Read the attribute PROG_ARM.

@@ -1,0 +1,83 @@
+"""Other programs of a folder that change variables which a program exports."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from postproc.exceptions import ProgramError
+from postproc.files import FolderListing, base_name, read_if_readable
+from postproc.language.analysis.shared_changes import SharedChange
+from postproc.language.pdl2.files import Pdl2FileName
+from postproc.language.pdl2.program import Program, parse
+from postproc.language.pdl2.side_effects import rows_effects
+from postproc.language.text.source import source_from_bytes
+from postproc.language.text.stamp import read_stamp
+
+READ_BEFORE = 8192  # programs of which is known what they change
+_EXPORTER = re.compile(rb"\bEXPORTED[ \t]+FROM[ \t]+(\w+)", re.IGNORECASE)
+
+
+def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]:
+    """Return other programs beside one that change variables which it exports.
+
+    Outputs do not count, nor does what only the word IMPORT makes known.
+    """
+    found = listing.once(program.absolute().parent, _find_changing)
+    own = base_name(program.name)
+    others = (one for one in found if base_name(one.name) != own)
+    return tuple(one for one in others if own in _list_exporters(one, *_version(one)))
+
+
+def _find_changing(folder: Path, listing: FolderListing) -> list[Path]:
+    """Find the programs of a folder that change what others export."""
+    programs = listing.ending(folder, Pdl2FileName.programs)
+    return [one for one in programs if _list_exporters(one, *_version(one))]
+
+
+def _version(path: Path) -> tuple[int, int]:
+    """Return what tells a file from what it was before."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(READ_BEFORE)
+def _list_exporters(path: Path, changed: int, size: int) -> frozenset[str]:
+    """Return the programs whose variables a program may change."""
+    data = read_if_readable(path)
+    if not _EXPORTER.search(data) or read_stamp(data) is not None:
+        return frozenset()
+    try:
+        program = parse(source_from_bytes(path.name, data))
+    except ProgramError:
+        return frozenset()
+    return frozenset(key.partition("/")[0] for key in _list_changes(program))
+
+
+def find_changes(others: Sequence[Program]) -> Mapping[str, Sequence[SharedChange]]:
+    """Find what other programs change of exported variables, by their keys."""
+    found = defaultdict[str, list[SharedChange]](list)
+    for other in others:
+        for key, row in _list_changes(other).items():
+            at = other.lines.source.name, other.lines.line(row)
+            found[key].append(SharedChange(key, (), *at))
+    return dict(found)
+
+
+def _list_changes(program: Program) -> dict[str, int]:
+    """Return the exported variables that a program may change, and where first."""
+    variables = program.variables
+    exported = {
+        name: f"{variables[name].exported}/{name}"
+        for name in variables.which(lambda said: bool(said.exported))
+        if variables[name].exported != program.name
+    }
+    rows = range(len(program.lines)) if exported else ()
+    found: dict[str, int] = {}
+    for row in rows:
+        for name in rows_effects(program, row, row + 1).assigned & exported.keys():
+            found.setdefault(exported[name], row)
+    return found
