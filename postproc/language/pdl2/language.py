@@ -21,7 +21,7 @@ from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import ParsedFiles, Source, parse_once
+from postproc.language.text.source import ParsedFiles, Source, parse_once, parse_shared
 from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
@@ -68,7 +68,7 @@ class Pdl2(Language):
                 variables = parse_once(known, source, read_variables)
                 texts.append(Skeleton.of(variables.lines))
             elif Pdl2FileName(source.name).is_apart:
-                beside.append(parse_once(known, source, parse))
+                beside.append(parse_shared(parse, source))
                 texts.append(Skeleton.of(beside[-1].lines))
             else:
                 page = parse_once(known, source, parse)
