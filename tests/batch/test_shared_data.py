@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from postproc.batch.plan import make_plan
 from postproc.batch.tree import scan
 from postproc.compensation.options import Options
+from postproc.files import FolderListing
+from postproc.language.languages import language_of
 from tests.golden.case import HERE
 
 KRL = {
@@ -45,3 +49,25 @@ def test_a_program_that_others_read_is_compensated(tmp_path, files, programs):
     changing, changed = programs
     assert reads.keys() == {*programs}
     assert changing in reads[changed] and changed not in reads[changing]
+
+
+@pytest.mark.parametrize("files", [KRL, RAPID, PDL2])
+def test_what_programs_share_is_looked_for_once_a_folder(tmp_path, monkeypatch, files):
+    for k in range(40):
+        for name, text in files.items():
+            copy = tmp_path / name.replace("b.", f"b{k}.")
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_text(text)
+    opened, read = [], Path.open
+    monkeypatch.setattr(Path, "open", lambda *a, **k: opened.append(a) or read(*a, **k))
+    given = [HERE / "rapid" / name for name in ("cell.toml", "model.json")]
+    plan = make_plan(None, *given, Options())
+    found = scan(tmp_path, plan)
+    count = len(opened)
+    assert len(found.units) >= 40 and count < 20 * 40
+    listing, (first, *_) = FolderListing(tmp_path), found.units
+    language_of(first.program).reads(tmp_path / first.program, listing)
+    opened.clear()
+    for unit in found.units:
+        language_of(unit.program).reads(tmp_path / unit.program, listing)
+    assert not opened

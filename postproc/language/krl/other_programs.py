@@ -31,20 +31,21 @@ def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]
 
     Outputs and sources of the controller do not count.
     """
-    folder = program.absolute().parent
-    found = listing.once(folder, _find_changing) if folder.is_dir() else ()
+    found = listing.beside(program, _find_changing)
     own = program.stem.lower()
     return tuple(one for one in found if one.stem.lower() != own)
 
 
-def _find_changing(folder: Path, listing: FolderListing) -> list[Path]:
+def _find_changing(folder: Path, listing: FolderListing, but: str) -> list[Path]:
     """Find programs of a folder, or of its archive, that change what all share."""
+    sources = find_in_archive(folder, KrlFileName.programs, listing)
+    others = [one for one in sources if one.name.lower() not in (but, *USER_SOURCES)]
+    if not others:
+        return []
     lists = find_in_archive(folder, (KrlFileName.data_lists,), listing)
     shared = HELD.union(*(_list_shared(one, *_version(one)) for one in lists))
     found: list[Path] = []
-    for other in find_in_archive(folder, KrlFileName.programs, listing):
-        if other.name.lower() in USER_SOURCES:
-            continue
+    for other in others:
         values = listing.named(other.parent, f"{other.stem}{KrlFileName.data_lists}")
         own = [other] if values is None else [other, values]
         changed, imports = _read_changes(*((one, *_version(one)) for one in own))
@@ -64,7 +65,8 @@ def _list_shared(path: Path, changed: int, size: int) -> frozenset[str]:
     """Return the words of a list with which it may declare data for all programs."""
     text = read_if_readable(path)
     if path.name.lower() != SHARED_LIST:
-        text = b"\n".join(_GLOBAL.findall(text))
+        some = _GLOBAL.findall(text) if b"global" in text.lower() else ()
+        text = b"\n".join(some)
     return frozenset(word.decode("latin-1").lower() for word in _WORD.findall(text))
 
 

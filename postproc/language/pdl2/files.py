@@ -7,7 +7,7 @@ from pathlib import PurePath
 from typing import ClassVar
 
 from postproc import _native
-from postproc.files import base_name
+from postproc.files import FolderListing, base_name
 from postproc.language.file_name import FileName, Named, Skip
 
 _WORDS = (b"import", b"routine", b"call")  # what names a program begins with one
@@ -43,13 +43,15 @@ class Pdl2FileName(FileName):
         """
         return _TARGETS.search(data) is not None
 
-    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+    def find_named(
+        self, text: bytes, skip: Skip, listing: FolderListing
+    ) -> tuple[Named, Named]:
         r"""Find what IMPORT, EXPORTED FROM and CALL name.
 
         A routine may call a page behind a thousand moves: all of it is looked at.
 
         >>> text = b"PROGRAM m\nIMPORT 'Page1'\nIMPORT '../x'\nBEGIN\nEND m"
-        >>> Pdl2FileName("m.pdl").find_named(text, bool)
+        >>> Pdl2FileName("m.pdl").find_named(text, bool, FolderListing())
         ({'page1': 2}, {'../x': 3})
         """
         inside: Named = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -18,7 +17,6 @@ from postproc.language.text.source import source_from_bytes
 from postproc.language.text.stamp import read_stamp
 
 READ_BEFORE = 8192  # programs of which is known what they change
-_EXPORTER = re.compile(rb"\bEXPORTED[ \t]+FROM[ \t]+(\w+)", re.IGNORECASE)
 
 
 def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]:
@@ -26,16 +24,21 @@ def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]
 
     Outputs do not count, nor does what only the word IMPORT makes known.
     """
-    found = listing.once(program.absolute().parent, _find_changing)
-    own = base_name(program.name)
-    others = (one for one in found if base_name(one.name) != own)
-    return tuple(one for one in others if own in _list_exporters(one, *_version(one)))
+    changing = listing.beside(program, _find_changing)
+    return tuple(changing.get(base_name(program.name), ()))
 
 
-def _find_changing(folder: Path, listing: FolderListing) -> list[Path]:
-    """Find the programs of a folder that change what others export."""
-    programs = listing.ending(folder, Pdl2FileName.programs)
-    return [one for one in programs if _list_exporters(one, *_version(one))]
+def _find_changing(
+    folder: Path, listing: FolderListing, but: str
+) -> Mapping[str, Sequence[Path]]:
+    """Find the programs of a folder that change what others export, by these."""
+    found = defaultdict[str, list[Path]](list)
+    for one in listing.ending(folder, Pdl2FileName.programs):
+        if one.name.lower() != but:
+            exporters = _list_exporters(one, *_version(one))
+            for exporter in exporters - {base_name(one.name)}:
+                found[exporter].append(one)
+    return found
 
 
 def _version(path: Path) -> tuple[int, int]:
@@ -48,7 +51,7 @@ def _version(path: Path) -> tuple[int, int]:
 def _list_exporters(path: Path, changed: int, size: int) -> frozenset[str]:
     """Return the programs whose variables a program may change."""
     data = read_if_readable(path)
-    if not _EXPORTER.search(data) or read_stamp(data) is not None:
+    if b"exported" not in data.lower() or read_stamp(data) is not None:
         return frozenset()
     try:
         program = parse(source_from_bytes(path.name, data))

@@ -6,6 +6,7 @@ import re
 from functools import lru_cache
 from pathlib import Path
 
+from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
 from postproc.language.analysis.shared_changes import list_shared_changes
@@ -16,9 +17,9 @@ from postproc.language.text.source import source_from_bytes
 from postproc.language.text.stamp import read_stamp
 
 READ_BEFORE = 8192  # modules of which is known what they change, or declare
+_WORDS = (b"task", b"var", b"pers")  # what declares such data begins with one
 _SHARED = re.compile(
-    rb"^[ \t]*(?:TASK[ \t]+)?(?:VAR|PERS)[ \t]+\w+[ \t]+(\w+)",
-    re.IGNORECASE | re.MULTILINE,
+    rb"[ \t]*(?:TASK[ \t]+)?(?:VAR|PERS)[ \t]+\w+[ \t]+(\w+)", re.IGNORECASE
 )
 
 
@@ -27,24 +28,33 @@ def changing_modules(program: Path, listing: FolderListing) -> tuple[Path, ...]:
 
     They may be loaded with it, or have run before it. Outputs do not count.
     """
-    found = listing.once(program.absolute().parent, _find_changing)
-    return tuple(one for one in found if one.name.lower() != program.name.lower())
+    found, own = listing.beside(program, _find_changing), program.name.lower()
+    return tuple(one for one in found if one.name.lower() != own)
 
 
-def _find_changing(folder: Path, listing: FolderListing) -> list[Path]:
+def _find_changing(folder: Path, listing: FolderListing, but: str) -> list[Path]:
     """Find the modules of a folder that change what other modules there declare."""
     modules = listing.ending(folder, RapidFileName.programs)
-    versions = [(one, one.stat()) for one in modules]
-    known = [(one, at.st_mtime_ns, at.st_size) for one, at in versions]
-    declared = frozenset[str]().union(*(_list_declared(*one) for one in known))
-    return [one[0] for one in known if _changes_any(*one, declared)]
+    others = [one for one in modules if one.name.lower() != but]
+    if not others:
+        return []
+    lists = (_list_declared(one, *_version(one)) for one in modules)
+    declared = frozenset[str]().union(*lists)
+    return [one for one in others if _changes_any(one, *_version(one), declared)]
+
+
+def _version(path: Path) -> tuple[int, int]:
+    """Return what tells a file from what it was before."""
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
 
 
 @lru_cache(READ_BEFORE)
 def _list_declared(path: Path, changed: int, size: int) -> frozenset[str]:
     """Return the variables and persistents that a module declares, as it is now."""
-    found = _SHARED.findall(read_if_readable(path))
-    return frozenset(name.decode("latin-1").lower() for name in found)
+    lines = _native.lines_beginning(read_if_readable(path), _WORDS)
+    found = filter(None, (_SHARED.match(line) for _, line in lines))
+    return frozenset(one[1].decode("latin-1").lower() for one in found)
 
 
 @lru_cache(READ_BEFORE)
