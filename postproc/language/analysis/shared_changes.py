@@ -14,6 +14,7 @@ from typing import Any
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.declarations import TaskFile
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd
+from postproc.language.language import Start, matches
 
 
 @dataclass(frozen=True)
@@ -36,19 +37,34 @@ def describe_changes(changes: Sequence[SharedChange]) -> str:
     """Say why data are not known that others change, and what to do about it."""
     first = changes[0]
     where = f"{first.file.rpartition('/')[2]} (line {first.line})"
-    return f"may be changed by {where}: set it before the moves that take it"
+    return (
+        f"may be changed by {where}: set it before the moves that take it, or, if that "
+        "program never runs, name it under [variables] constant in the cell file"
+    )
 
 
 def collect_changes(
-    others: Iterable[TaskSymbols[Any]], shared: Container[str]
+    others: Iterable[TaskSymbols[Any]], shared: Container[str], start: Start
 ) -> Mapping[str, Sequence[SharedChange]]:
-    """Collect what other programs change of some shared data, by name."""
+    """Collect what other programs change of some shared data, by name.
+
+    Args:
+        others: The other programs.
+        shared: Names of the data.
+        start: What the cell says: it may call data constant.
+    """
     found = defaultdict[str, list[SharedChange]](list)
     for other in others:
         for one in list_shared_changes(other):
-            if one.name in shared:
+            if one.name in shared and not _is_constant(one, start):
                 found[one.name].append(one)
     return dict(found)
+
+
+def _is_constant(change: SharedChange, start: Start) -> bool:
+    """Tell whether the cell says that data keep what the files give them."""
+    element = f"{change.name}[{','.join(map(str, change.index))}]"
+    return element in start.constant or matches(start.constant, (change.name,))
 
 
 def list_shared_changes(task: TaskSymbols[Any]) -> Iterator[SharedChange]:

@@ -149,7 +149,8 @@ class KrlTask(TaskSymbols[KrlFile]):
         programs = defaultdict[str, list[KrlFile]](list)
         for file in self.files_beside:
             programs[file.name].append(file)
-        return collect_changes(map(KrlTask, programs.values()), shared)
+        others = map(KrlTask, programs.values())
+        return collect_changes(others, shared, self.start)
 
     def name_for_others(self, name: str) -> str:
         """Leave what programs set before each of their moves, see `TaskSymbols`."""

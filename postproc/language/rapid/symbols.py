@@ -180,7 +180,7 @@ class RapidTask(TaskSymbols[RapidFile]):
         }  # fmt: skip
         files = (one for one in self.files_beside if not _task_of(one))
         others = [RapidTask([file]) for file in files]
-        found = dict(collect_changes(others, shared))
+        found = dict(collect_changes(others, shared, self.start))
         for change in (change for one in others for change in one.changes_by_string):
             found |= {name: [change, *found.get(name, ())] for name in shared}
         return found

@@ -25,13 +25,13 @@ def other(body, declared=""):
     return f"MODULE o\n{declared}\nPROC before()\n{body}\nENDPROC\nENDMODULE\n"
 
 
-def reasons(lines, body, declared="", replace=shared):
+def reasons(lines, body, declared="", replace=shared, **said):
     own = module(*lines).decode()
     for line in (POINT, TOOL, WOBJ):
         own = own.replace(line, replace(line))
     sources = [Source("job.mod", own.encode())]
     sources.append(Source("MODULES/o.mod", other(body, declared).encode()))
-    v = Rapid().read(sources, Start()).visits
+    v = Rapid().read(sources, Start(**said)).visits
     return [v.reasons[k].text for k in v.reason.tolist()][1:]  # without home
 
 
@@ -72,6 +72,10 @@ def test_names_of_another_routine_are_not_those_of_all():
     body = f"w.uframe:={FRAME};\nENDPROC\nPROC more()\nVAR wobjdata w;"
     (why,) = reasons([go("p1")], body)
     assert "o.mod" in why
+
+
+def test_what_the_cell_calls_constant_is_known():
+    assert reasons([go("p1")], f"w.uframe:={FRAME};", constant=("w",)) == [""]
 
 
 def test_what_a_program_sets_by_itself_is_known():
