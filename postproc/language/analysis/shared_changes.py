@@ -44,20 +44,19 @@ def describe_changes(changes: Sequence[SharedChange]) -> str:
 
 
 def collect_changes(
-    others: Iterable[TaskSymbols[Any]], shared: Container[str], start: Start
+    changes: Iterable[SharedChange], shared: Container[str], start: Start
 ) -> Mapping[str, Sequence[SharedChange]]:
-    """Collect what other programs change of some shared data, by name.
+    """Collect changes of some shared data by name.
 
     Args:
-        others: The other programs.
+        changes: All that other programs change.
         shared: Names of the data.
         start: What the cell says: it may call data constant.
     """
     found = defaultdict[str, list[SharedChange]](list)
-    for other in others:
-        for one in list_shared_changes(other):
-            if one.name in shared and not _is_constant(one, start):
-                found[one.name].append(one)
+    for one in changes:
+        if one.name in shared and not _is_constant(one, start):
+            found[one.name].append(one)
     return dict(found)
 
 

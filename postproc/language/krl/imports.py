@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from postproc.language.krl.program import KrlFile
+from postproc.language.text.source import Source
 
 _IMPORT = re.compile(  # of a name, from a list, by its name there
     rb"^[ \t]*(?:DECL[ \t]+)?IMPORT[ \t]+\w+[ \t]+(\w+)[^;\n]*?\bIS\b[^;\n]*?"
@@ -29,9 +29,9 @@ class ImportedDatum:
     original: str
 
 
-def list_imports(files: Sequence[KrlFile]) -> list[ImportedDatum]:
+def list_imports(sources: Sequence[Source]) -> list[ImportedDatum]:
     """List what files import from lists of other programs."""
-    found = (match for one in files for match in _IMPORT.findall(one.text.source.data))
+    found = (match for one in sources for match in _IMPORT.findall(one.data))
     return [
         ImportedDatum(*(part.decode("ascii").lower() for part in one)) for one in found
     ]

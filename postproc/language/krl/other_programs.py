@@ -8,7 +8,6 @@ from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
-from postproc.language.analysis.shared_changes import list_shared_changes
 from postproc.language.krl.files import (
     SHARED_LIST,
     USER_SOURCES,
@@ -16,8 +15,7 @@ from postproc.language.krl.files import (
     find_in_archive,
 )
 from postproc.language.krl.imports import list_imports
-from postproc.language.krl.program import read_krl
-from postproc.language.krl.symbols import HELD, KrlTask
+from postproc.language.krl.symbols import HELD, list_changes
 from postproc.language.text.source import source_from_bytes
 from postproc.language.text.stamp import read_stamp
 
@@ -82,8 +80,8 @@ def _read_changes(*versions: tuple[Path, int, int]) -> tuple[frozenset[str], boo
     if KrlFileName(name).is_system_source(text) or read_stamp(text) is not None:
         return frozenset(), False
     try:
-        files = [read_krl(source_from_bytes(*one)) for one in texts.items()]
+        sources = [source_from_bytes(*one) for one in texts.items()]
+        changes = list_changes(*sources)
     except ProgramError:
         return frozenset(), False
-    changes = list_shared_changes(KrlTask(files))
-    return frozenset(one.name for one in changes), bool(list_imports(files))
+    return frozenset(one.name for one in changes), bool(list_imports(sources))

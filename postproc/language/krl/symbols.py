@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from postproc.language.analysis.shared_changes import (
     SharedChange,
     collect_changes,
     describe_changes,
+    list_shared_changes,
 )
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
@@ -28,8 +30,9 @@ from postproc.language.analysis.values import KnownRecord, Layout, Value, Writte
 from postproc.language.krl import syntax as said
 from postproc.language.krl.imports import list_imports
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
-from postproc.language.krl.program import KrlFile
+from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.shifts import Pose, Shift, ShiftKind
+from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 from postproc.language.text.symbol_column import read_names
 
 CONFIG = "$config"
@@ -138,7 +141,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def _imported(self) -> frozenset[tuple[str, str]]:
         """Lists and names of data that other programs import."""
-        found = list_imports(self.files_beside)
+        found = list_imports(_sources(self.files_beside))
         return frozenset((one.module, one.original) for one in found)
 
     @cached_property
@@ -146,11 +149,11 @@ class KrlTask(TaskSymbols[KrlFile]):
         """What other programs change of the data that all share, by name."""
         data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
         shared = HELD.union(one.name for k, one in data if self.shares(k, one))
-        programs = defaultdict[str, list[KrlFile]](list)
+        programs = defaultdict[str, list[Source]](list)
         for file in self.files_beside:
-            programs[file.name].append(file)
-        others = map(KrlTask, programs.values())
-        return collect_changes(others, shared, self.start)
+            programs[file.name].append(file.text.source)
+        changes = (list_changes(*own) for own in programs.values())
+        return collect_changes(chain.from_iterable(changes), shared, self.start)
 
     def name_for_others(self, name: str) -> str:
         """Leave what programs set before each of their moves, see `TaskSymbols`."""
@@ -160,7 +163,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def _own_imports(self) -> Mapping[str, str]:
         """Names in other lists of what is imported."""
-        return {one.name: one.original for one in list_imports(self.files)}
+        return {one.name: one.original for one in list_imports(_sources(self.files))}
 
     def outlives(self, datum: Datum) -> bool:
         """Return True for data of a list."""
@@ -498,3 +501,14 @@ def _is_of_part(target: ir.DataObject) -> bool:
 def is_word(operand: ir.Operand | None, word: str) -> bool:
     """Return True if an operand is a word such as TRUE."""
     return operand == ir.DataObject(word)
+
+
+@lru_cache(KEPT_FILES)
+def list_changes(*sources: Source) -> tuple[SharedChange, ...]:
+    """List what a program with its data list changes of what all share."""
+    files = [parse_shared(read_krl, one) for one in sources]
+    return tuple(list_shared_changes(KrlTask(files)))
+
+
+def _sources(files: Sequence[KrlFile]) -> list[Source]:
+    return [one.text.source for one in files]

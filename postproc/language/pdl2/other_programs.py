@@ -13,7 +13,12 @@ from postproc.language.analysis.shared_changes import SharedChange
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.side_effects import rows_effects
-from postproc.language.text.source import source_from_bytes
+from postproc.language.text.source import (
+    KEPT_FILES,
+    Source,
+    parse_shared,
+    source_from_bytes,
+)
 from postproc.language.text.stamp import read_stamp
 
 READ_BEFORE = 8192  # programs of which is known what they change
@@ -54,24 +59,26 @@ def _list_exporters(path: Path, changed: int, size: int) -> frozenset[str]:
     if b"exported" not in data.lower() or read_stamp(data) is not None:
         return frozenset()
     try:
-        program = parse(source_from_bytes(path.name, data))
+        changes = _list_changes(source_from_bytes(path.name, data))
     except ProgramError:
         return frozenset()
-    return frozenset(key.partition("/")[0] for key in _list_changes(program))
+    return frozenset(key.partition("/")[0] for key in changes)
 
 
 def find_changes(others: Sequence[Program]) -> Mapping[str, Sequence[SharedChange]]:
     """Find what other programs change of exported variables, by their keys."""
     found = defaultdict[str, list[SharedChange]](list)
     for other in others:
-        for key, row in _list_changes(other).items():
-            at = other.lines.source.name, other.lines.line(row)
-            found[key].append(SharedChange(key, (), *at))
+        for key, line in _list_changes(other.lines.source).items():
+            change = SharedChange(key, (), other.lines.source.name, line)
+            found[key].append(change)
     return dict(found)
 
 
-def _list_changes(program: Program) -> dict[str, int]:
-    """Return the exported variables that a program may change, and where first."""
+@lru_cache(KEPT_FILES)
+def _list_changes(source: Source) -> dict[str, int]:
+    """Return the exported variables that a program may change, and the first lines."""
+    program = parse_shared(parse, source)
     variables = program.variables
     exported = {
         name: f"{variables[name].exported}/{name}"
@@ -82,5 +89,5 @@ def _list_changes(program: Program) -> dict[str, int]:
     found: dict[str, int] = {}
     for row in rows:
         for name in rows_effects(program, row, row + 1).assigned & exported.keys():
-            found.setdefault(exported[name], row)
+            found.setdefault(exported[name], program.lines.line(row))
     return found

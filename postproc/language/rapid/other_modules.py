@@ -9,10 +9,8 @@ from pathlib import Path
 from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
-from postproc.language.analysis.shared_changes import list_shared_changes
 from postproc.language.rapid.files import RapidFileName
-from postproc.language.rapid.program import read_rapid
-from postproc.language.rapid.symbols import RapidTask
+from postproc.language.rapid.symbols import list_changes
 from postproc.language.text.source import source_from_bytes
 from postproc.language.text.stamp import read_stamp
 
@@ -67,8 +65,7 @@ def _changes_any(path: Path, changed: int, size: int, declared: frozenset[str]) 
     if read_stamp(data) is not None:
         return False
     try:
-        task = RapidTask([read_rapid(source_from_bytes(path.name, data))])
+        changes = list_changes(source_from_bytes(path.name, data))
     except ProgramError:
         return False
-    changes = (one.name for one in list_shared_changes(task))
-    return task.sets_by_string or not declared.isdisjoint(changes)
+    return any(not one.name or one.name in declared for one in changes)

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from itertools import chain
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.move_blocks import TargetSlots
-from postproc.language.analysis.shared_changes import SharedChange, collect_changes
+from postproc.language.analysis.shared_changes import (
+    SharedChange,
+    collect_changes,
+    list_shared_changes,
+)
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import (
@@ -36,8 +41,9 @@ from postproc.language.rapid.instructions import (
     read_controller_data,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT, WIDTH
-from postproc.language.rapid.program import RapidFile
+from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
 """Functions whose first argument is a target."""
@@ -178,12 +184,14 @@ class RapidTask(TaskSymbols[RapidFile]):
             one.name for k, one in data
             if one.kind != "const" and not one.routine and self.shares(k, one)
         }  # fmt: skip
-        files = (one for one in self.files_beside if not _task_of(one))
-        others = [RapidTask([file]) for file in files]
-        found = dict(collect_changes(others, shared, self.start))
-        for change in (change for one in others for change in one.changes_by_string):
-            found |= {name: [change, *found.get(name, ())] for name in shared}
-        return found
+        others = (one for one in self.files_beside if not _task_of(one))
+        changes = chain.from_iterable(list_changes(one.text.source) for one in others)
+        every = (
+            replace(one, name=name)
+            for one in changes
+            for name in ([one.name] if one.name else shared)
+        )
+        return collect_changes(every, shared, self.start)
 
     # What other tasks do: global persistents of one name are the same data.
 
@@ -392,3 +400,10 @@ def as_assignment(
         case "add", (ir.DataObject() as target, ir.Operand() as by):
             return ir.Assignment(target, ir.Operation("+", (target, by)))
     return None
+
+
+@lru_cache(KEPT_FILES)
+def list_changes(source: Source) -> tuple[SharedChange, ...]:
+    """List what a module changes of others' data, without a name of any of them."""
+    task = RapidTask([parse_shared(read_rapid, source)])
+    return (*task.changes_by_string, *list_shared_changes(task))

@@ -21,7 +21,7 @@ from postproc.exceptions import PostprocError, ProgramError
 AT_ONCE = 50_000  # edits that are Python objects at the same time
 T = TypeVar("T")
 LAST = 2**31 - 1  # offset in a file; none that is read is as long
-READ_BEFORE = 256  # files that are kept as they were read
+KEPT_FILES = 256  # files that are kept as they were read
 
 
 class Span(NamedTuple):
@@ -279,7 +279,7 @@ def parse_once(
     return found
 
 
-@lru_cache(READ_BEFORE)
+@lru_cache(KEPT_FILES)
 def parse_shared(parse: Callable[[Source], T], source: Source) -> T:
     """Parse a file that many programs of a folder read, once for all of them."""
     return parse(source)
