@@ -10,13 +10,13 @@ import signal
 import stat
 import threading
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import IO, Any, BinaryIO, NoReturn, Self
+from typing import IO, Any, BinaryIO, NoReturn, Self, TypeVar
 
 from postproc.exceptions import DiskFullError, OutputError, ProgramError
 from postproc.operating_system import ENDING, set_mode, sync_folder
@@ -27,6 +27,7 @@ TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
 NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
 AHEAD = 3  # pieces of a file that are made before they are written
+T = TypeVar("T")
 STREAM = "-"  # stands for standard input or output
 
 _PASSING = (stat.S_ISFIFO, stat.S_ISCHR)  # kinds that bytes pass through
@@ -386,7 +387,8 @@ class FolderListing:
         self.root = root
         self._entries: dict[Path, tuple[Path, ...]] = {}
         self._named: dict[Path, dict[str, Path]] = {}
-        self._below: dict[tuple[Path, tuple[str, ...]], tuple[Path, ...]] = {}
+        self._ending: dict[tuple[Path, tuple[str, ...], bool], tuple[Path, ...]] = {}
+        self._found: dict[tuple[Path, object], Any] = {}
 
     def entries(self, folder: Path) -> tuple[Path, ...]:
         """Return what a folder holds, in order; nothing where it is none."""
@@ -412,14 +414,40 @@ class FolderListing:
             suffixes: In lower case.
             below: Those of all folders below it, too.
         """
-        if not below:
-            own = (p for p in self.entries(folder) if p.suffix.lower() in suffixes)
-            return tuple(p for p in own if p.is_file())
-        key = folder, suffixes
-        if key not in self._below:
-            found = (p for p in folder.rglob("*.*") if p.suffix.lower() in suffixes)
-            self._below[key] = tuple(p for p in sorted(found) if p.is_file())
-        return self._below[key]
+        key = folder, suffixes, below
+        if key not in self._ending:
+            every = sorted(folder.rglob("*.*")) if below else self.entries(folder)
+            found = (path for path in every if path.suffix.lower() in suffixes)
+            self._ending[key] = tuple(filter(Path.is_file, found))
+        return self._ending[key]
+
+    def once(self, folder: Path, find: Callable[[Path, FolderListing], T]) -> T:
+        """Return what is found for all programs of a folder alike.
+
+        Args:
+            folder: The folder.
+            find: Finds it; it is asked once for a folder.
+        """
+        if (folder, find) not in self._found:
+            self._found[folder, find] = find(folder, self)
+        found: T = self._found[folder, find]
+        return found
+
+    def beside(self, program: Path, find: Callable[[Path, FolderListing, str], T]) -> T:
+        """Find something beside a program, once for all programs of a tree.
+
+        Args:
+            program: The program.
+            find: Finds it in a folder. Last, it is given the name of a file that need
+                not be read, in lower case: of a program alone, which may be a long one.
+        """
+        folder = program.absolute().parent
+        if self.root is None:
+            return find(folder, self, program.name.lower())
+        if (folder, find) not in self._found:
+            self._found[folder, find] = find(folder, self, "")
+        found: T = self._found[folder, find]
+        return found
 
 
 # Reading files and streams that somebody else has made.

@@ -67,7 +67,7 @@ MEANINGS = {
     "EnvironmentSection.temperature_c": "temperature of the correction",
     "TrackerSection.xyz_mm": "place of the tracker in the base frame",
     "VerifySection.second_opinion": "ask for a second opinion on the output",
-    "VariablesSection.constant": "exported variables that no other program changes",
+    "VariablesSection.constant": "variables and data that no other program changes",
     "FramesSection.routines": "frames that a routine sets, by its name and arguments",
     "FrameTableEntry.tool": "TCP after the call",
     "FrameTableEntry.base": "base after the call",

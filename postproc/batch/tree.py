@@ -6,6 +6,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from postproc.batch.plan import BatchPlan, Unit
@@ -78,11 +79,12 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
     listing = FolderListing(root.absolute())
     found = [_sort(root, names, plan, listing) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
-    # What a program reads and is not rewritten beside it: other tasks have programs.
-    read = [
-        (place, PurePosixPath(unit.program)) for unit in units for place in unit.reads
-    ]
-    only_read = {place for place, by in read if not file_named(place).runs_beside(by)}
+    read = {
+        (place, PurePosixPath(unit.program).parent)
+        for unit in units
+        for place in unit.reads
+    }
+    only_read = {place for place, by in read if not _is_program_by_itself(place, by)}
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
     units = [unit for unit in units if unit.program not in only_read]
     # The largest first: no worker is left alone with one at the end.
@@ -95,6 +97,12 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
         tuple(note for part in found for note in part.notes),
         sum(sizes.values()),
     )
+
+
+def _is_program_by_itself(place: str, folder: PurePosixPath) -> bool:
+    """Tell whether a file that programs of a folder read is one by itself."""
+    name = file_named(place).name_for(folder / "program")
+    return file_named(name).is_apart
 
 
 def _walk(root: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:
@@ -158,7 +166,7 @@ def _sort(
                 part.notes.append((place, _STALE))
     named, arms = {}, {}
     for base, place in programs.items():
-        named[base], outside = names_in(root / place)
+        named[base], outside = names_in(root / place, listing)
         arms[base] = program_arm(root / place)
         part.notes += [
             (place, f"{n!r} is outside of its folder: not followed") for n in outside
@@ -179,8 +187,14 @@ def _find_shared(root: Path, program: str, listing: FolderListing) -> tuple[str,
     """Return the places of what a program shares with others, and only reads."""
     root = root.absolute()
     found = language_of(program).reads(root / program, listing)
-    inside = (one for one in found if root in one.parents)
-    return tuple(one.relative_to(root).as_posix() for one in inside)
+    return tuple(filter(None, (_place_below(root, one) for one in found)))
+
+
+@lru_cache(8192)
+def _place_below(root: Path, path: Path) -> str:
+    """Return the place of a file below a folder, "" where it is not there."""
+    inside = root in path.parents
+    return path.relative_to(root).as_posix() if inside else ""
 
 
 def _by_base(

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from postproc.compensation.output.sidecar import sidecar_path
-from postproc.files import read_if_readable
+from postproc.files import FolderListing, read_if_readable
 from postproc.language.languages import file_named
 from postproc.language.text.stamp import read_stamp
 
@@ -33,15 +33,21 @@ def of_one_arm(program: int, page: int) -> bool:
     return page in (0, program or 1)
 
 
-def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
+def names_in(
+    path: Path, listing: FolderListing
+) -> tuple[dict[str, int], dict[str, int]]:
     """Find the programs that a file names, none if unreadable.
 
     See `FileName.find_named`. Outputs belong to outputs alone, and a file that has its
     output beside it to none of them.
+
+    Args:
+        path: The file.
+        listing: What its folder holds.
     """
     written = is_output(path) or sidecar_path(path).is_file()
     skip = _has_output if written else is_output
-    return file_named(path).find_named(read_if_readable(path), skip)
+    return file_named(path).find_named(read_if_readable(path), skip, listing)
 
 
 def _has_output(path: Path) -> bool:

@@ -69,13 +69,14 @@ def find_pages(program: Path) -> Pages:
     do not count, nor do earlier outputs, unless the program is one: what was changed
     of a job lies in its pages alone where those hold its points.
     """
-    wanted, outside = names_in(program)
+    listing = FolderListing()
+    wanted, outside = names_in(program, listing)
     notes = [
         _not_followed(program, line, f"{name!r} leads out of the folder: not followed")
         for name, line in outside.items()
     ]
     main = file_named(program).key
-    reads = language_of(program.name).reads(program, FolderListing())
+    reads = language_of(program.name).reads(program, listing)
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
@@ -85,7 +86,9 @@ def find_pages(program: Path) -> Pages:
     programs = {file_named(p).key: p for p in files if _is_page(p, outputs)}
     programs |= {main: program}
     named = {
-        base: {name: k for name, k in names_in(path)[0].items() if name != main}
+        base: {
+            name: k for name, k in names_in(path, listing)[0].items() if name != main
+        }
         for base, path in programs.items()
     }
     arms = {base: program_arm(path) for base, path in programs.items()}

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import ClassVar
 
-from postproc.files import base_name, find_beside
+from postproc.files import FolderListing, base_name, find_beside
 
 Named = dict[str, int]  # names of programs, and the lines that name them first
 Skip = Callable[[Path], bool]  # files that belong to no program
@@ -133,12 +133,15 @@ class FileName:
         """Tell whether the content of a variable file has positions."""
         return False
 
-    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+    def find_named(
+        self, text: bytes, skip: Skip, listing: FolderListing
+    ) -> tuple[Named, Named]:
         """Find the programs that a program or a data list names.
 
         Args:
             text: All of it.
             skip: Files beside it that belong to no program.
+            listing: What its folder holds.
 
         Returns:
             Keys of programs of its folder, in order, each with the line that names it
@@ -162,6 +165,10 @@ class FileName:
         """
         return PurePath(self.place).name
 
-    def runs_beside(self, program: PurePath) -> bool:
-        """Tell whether it belongs to another task of a backup than a program."""
+    @property
+    def is_apart(self) -> bool:
+        """Tell by its name in a job whether it is a program by itself.
+
+        A job may read such a one for what it does to shared data.
+        """
         return False

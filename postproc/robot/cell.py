@@ -482,8 +482,8 @@ class Cell:
             frames, where that is stated, (3, 6) from -1 to 1.
         taught_frames: Records of the frames that were taught with the robot, with the
             joint angles of their three points, (3, 6) [rad], or None.
-        constant: Lower-case patterns of exported variables, ``name`` or
-            ``program.name``, that no other program changes.
+        constant: Lower-case patterns of variables and shared data, ``name``,
+            ``name[index]`` or ``program.name``, that no other program changes.
     """
 
     path: Path

@@ -7,6 +7,7 @@ import pytest
 from postproc.compensation.output.sidecar import sidecar_path
 from postproc.compensation.pages import names_in
 from postproc.compensation.program_files import find_pages
+from postproc.files import FolderListing
 from postproc.language.text.source import Source
 from postproc.language.text.stamp import stamp_line
 
@@ -23,7 +24,7 @@ def test_outputs_are_no_modules_of_the_task(tmp_path, stamped):
         first, _, rest = text.partition(b"\n")
         output.write_bytes(first + b"\n" + stamp + rest)
         sidecar_path(output).write_text("{}")
-    assert set(names_in(tmp_path / "main.mod")[0]) == {"part.mod"}
+    assert set(names_in(tmp_path / "main.mod", FolderListing())[0]) == {"part.mod"}
 
 
 @pytest.mark.parametrize("changed", [True, False])
@@ -39,7 +40,7 @@ def test_outputs_are_modules_of_an_output(tmp_path, end, changed):
             own = stamp if changed or name == "part.mod" else b""
             output.write_bytes(first + b"\n" + own + rest)
             sidecar_path(output).write_text("{}")
-    found = names_in(tmp_path / f"main{end}.mod")[0]
+    found = names_in(tmp_path / f"main{end}.mod", FolderListing())[0]
     assert set(found) == {f"part{end}.mod", "same.mod"}
     if not end:
         pages = find_pages(tmp_path / "main.mod").paths
@@ -49,7 +50,9 @@ def test_outputs_are_modules_of_an_output(tmp_path, end, changed):
 def test_a_module_with_such_a_name_and_no_record_is_one(tmp_path):
     for name, text in (("main.mod", MAIN), ("part.compensated.mod", PART)):
         (tmp_path / name).write_bytes(text)
-    assert set(names_in(tmp_path / "main.mod")[0]) == {"part.compensated.mod"}
+    assert set(names_in(tmp_path / "main.mod", FolderListing())[0]) == {
+        "part.compensated.mod"
+    }
 
 
 POINTS = b"DEFDAT points PUBLIC\nDECL GLOBAL E6POS XGRIP={X 1}\nENDDAT\n"
@@ -72,7 +75,7 @@ def test_lists_with_points_for_all_programs(tmp_path, other, named):
     files = {"job.src": USER, "points.src": EMPTY, "points.dat": POINTS}
     for name, text in {**files, **other}.items():
         (tmp_path / name).write_bytes(text)
-    wanted = names_in(tmp_path / "job.src")[0]
+    wanted = names_in(tmp_path / "job.src", FolderListing())[0]
     assert ("points.src" in wanted) == named
     assert not named or wanted["points.src"] == 2
     pages = find_pages(tmp_path / "job.src").paths

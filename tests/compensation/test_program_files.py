@@ -12,6 +12,7 @@ from postproc.compensation.pages import is_output
 from postproc.compensation.program import read_program
 from postproc.compensation.program_files import find_pages
 from postproc.exceptions import ProgramError
+from postproc.files import FolderListing
 from postproc.language.languages import file_named
 from tests.plant import contents, pages
 from tests.written import cli
@@ -142,7 +143,7 @@ def test_pages_that_are_named_far_behind_the_declarations_are_followed(tmp_path)
 
 def test_the_programs_that_a_text_names():
     text = b"IMPORT 'a'\rIMPORT 'x'\r\nCALL b\ncall b -- call c\nMOVE recall\n CALL d"
-    found = file_named("m.pdl").find_named(text, is_output)
+    found = file_named("m.pdl").find_named(text, is_output, FolderListing())
     assert found == ({"a": 1, "b": 2, "d": 5}, {})
 
 

@@ -68,6 +68,7 @@ class TaskSymbols(ABC, Generic[F]):
         by_name: Records hold their components by name, not by their order.
         uncertain: Operators whose result kinds of numbers, or controllers, decide.
         apart: Data may be declared in one place and get their first value elsewhere.
+        still_words: What statements set nothing that begin with, understood or not.
         volatile: Names of data that may change at any time, by what runs beside.
         reader: Reads where moves lead, None where nothing is followed.
     """
@@ -83,6 +84,7 @@ class TaskSymbols(ABC, Generic[F]):
     by_name: ClassVar[bool] = False
     uncertain: ClassVar[Collection[str]] = ("DIV", "MOD")
     apart: ClassVar[bool] = False
+    still_words: ClassVar[Collection[str]] = ()
     volatile: frozenset[str] = field(default=frozenset(), init=False)
     reader: type[Any] | None = field(default=None, init=False)
     _own: dict[Place, dict[tuple[int, ...], tuple[int, Datum]]] = field(
@@ -150,6 +152,14 @@ class TaskSymbols(ABC, Generic[F]):
     def is_exported(self, datum: Datum) -> bool:
         """Return True if other programs may go to a point, too."""
         return datum.scope == "global"
+
+    def name_for_others(self, name: str) -> str:
+        """Return what others call data that the task does not declare, "" if none do.
+
+        Args:
+            name: Of data of another program, as it is written.
+        """
+        return name
 
     def is_followed(self, name: str, datum: Datum, here: Scope) -> bool:
         """Return True if nothing but assignments on the way changes data."""
@@ -717,6 +727,13 @@ class TaskSymbols(ABC, Generic[F]):
         values = [whole(self.number(one, here)) for one in step.subscripts]
         known = tuple(k for k in values if k is not None)
         return known if len(known) == len(values) and known else None
+
+    def index_of(self, target: ir.DataObject, here: Scope) -> tuple[int, ...]:
+        """Return the index of an element that is changed, () where it is not known."""
+        step = target.steps[0] if target.steps else ""
+        if isinstance(step, str) or any(data.steps for data in ir.data_in(step)):
+            return ()
+        return self.index(step, here) or ()
 
     # What assignments give to data.
 

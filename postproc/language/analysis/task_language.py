@@ -17,7 +17,7 @@ from postproc.language.language import Cloner, JobReading, Language, Start
 from postproc.language.text.blocks import check_blocks
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import ParsedFiles, Source, parse_once
+from postproc.language.text.source import ParsedFiles, Source, parse_once, parse_shared
 from postproc.language.visits import never_reached
 
 
@@ -110,7 +110,7 @@ class TaskLanguage(Language):
             problem = "the file holds no routine"
             raise ProgramError(own[0].name, problem, self.cure)
         self.refuse(files)
-        beside = [parse_once(known, one, self.read_file) for one in others]
+        beside = [parse_shared(self.read_file, one) for one in others]
         return self.task(files, start, beside)
 
     def read(

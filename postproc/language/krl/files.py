@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path, PurePath
 from typing import ClassVar
 
-from postproc.files import FolderListing, base_name, find_beside, read_if_readable
+from postproc.files import FolderListing, base_name, read_if_readable
 from postproc.language.file_name import FileName, Named, Skip
 
 SHARED_LIST, ARCHIVE_DEPTH = "$config.dat", 4
@@ -81,7 +80,9 @@ class KrlFileName(FileName):
         own = (begin + name.encode() + rb"\b" for name in names)
         return all(re.search(pattern, text) for pattern in own)
 
-    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+    def find_named(
+        self, text: bytes, skip: Skip, listing: FolderListing
+    ) -> tuple[Named, Named]:
         """Name the data list of a source, and those sources that it may call."""
         if not self.is_program:
             return {}, {}
@@ -90,7 +91,7 @@ class KrlFileName(FileName):
             called = f"{call[1].decode('latin-1').lower()}{self.programs[0]}"
             if called not in found:
                 found[called] = text.count(b"\n", 0, call.start()) + 1
-        return found | _name_lists(Path(self.place), text), {}
+        return found | _name_lists(Path(self.place), text, listing), {}
 
     def find_shared(self, listing: FolderListing) -> tuple[Path, ...]:
         """Find what a source shares with others: ``$config.dat``, and submit programs.
@@ -118,6 +119,11 @@ class KrlFileName(FileName):
     @property
     def is_from_elsewhere(self) -> bool:
         """Tell whether it is the name of another program that changes shared data."""
+        return self.is_apart
+
+    @property
+    def is_apart(self) -> bool:
+        """Tell by the folder that its name begins with."""
         return self.place.startswith(OTHER_PROGRAMS)
 
 
@@ -165,42 +171,44 @@ def find_shared_list(folder: Path, listing: FolderListing) -> Path | None:
     return found
 
 
-def _name_lists(path: Path, text: bytes) -> Named:
+def _name_lists(path: Path, text: bytes, listing: FolderListing) -> Named:
     """Name sources without moves whose lists declare points that a source goes to."""
-    lists = [(KrlFileName(str(other)), other.stat())
-             for other in sorted(path.parent.iterdir())
-             if KrlFileName(other.name).is_data_list
-             and other.stem.lower() != path.stem.lower()
-             and other.is_file() and not other.is_symlink()]  # fmt: skip
-    public = [(list_, _points_for_all(list_, at.st_mtime_ns, at.st_size))
-              for list_, at in lists]  # fmt: skip
-    if not any(points for _, points in public):
+    every = listing.once(path.parent, _list_public)
+    public = {own: points for own, points in every.items() if _stem(own) != _stem(path)}
+    if not public:
         return {}
-    found: Named = {}
     lines = {
         word[0].lower(): word.start() for word in reversed([*_WORD.finditer(text)])
     }
-    for other, points in public:
-        places = [lines[name] for name in points & lines.keys()]
-        if places:
-            own = find_beside(Path(other.place), Path(other.program).name)
-            line = text.count(b"\n", 0, min(places)) + 1
-            found[KrlFileName(str(own or other.place)).key] = line
+    found: Named = {}
+    for own, points in public.items():
+        if places := [lines[name] for name in points & lines.keys()]:
+            found[KrlFileName(str(own)).key] = 1 + text.count(b"\n", 0, min(places))
     return found
 
 
-@lru_cache(maxsize=8192)
-def _points_for_all(file: KrlFileName, changed: int, size: int) -> frozenset[bytes]:
-    """Return the points that a list declares for all programs, in lower case.
+def _stem(path: Path) -> str:
+    return path.stem.lower()
+
+
+def _list_public(folder: Path, listing: FolderListing) -> dict[Path, frozenset[bytes]]:
+    """Return the points that lists of a folder declare for all programs, lower case.
 
     A list whose source moves belongs to that source, whoever else names its points. A
-    list needs no source.
+    list needs no source: it is named by that, or by itself.
     """
-    place = Path(file.place)
+    found = {}
+    for place in listing.ending(folder, (KrlFileName.data_lists,)):
+        points = frozenset() if place.is_symlink() else _find_public(place)
+        source = listing.named(folder, f"{place.stem}{KrlFileName.programs[0]}")
+        if points and not (source and _MOVE.search(read_if_readable(source))):
+            found[source or place] = points
+    return found
+
+
+def _find_public(place: Path) -> frozenset[bytes]:
+    """Return the points that a list declares for all programs, in lower case."""
     text = read_if_readable(place)
-    if not _PUBLIC.search(text):
-        return frozenset()
-    names = frozenset(name.lower() for name in _SHARED_POINT.findall(text))
-    own = find_beside(place, Path(file.program).name) if names else None
-    moves = own is not None and _MOVE.search(read_if_readable(own)) is not None
-    return frozenset() if moves else names
+    public = b"global" in text.lower() and _PUBLIC.search(text)
+    points = _SHARED_POINT.findall(text) if public else ()
+    return frozenset(name.lower() for name in points)

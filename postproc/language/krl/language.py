@@ -69,7 +69,7 @@ class Krl(TaskLanguage):
 
     def is_beside(self, source: Source) -> bool:
         """Return True for another program, or its list, that changes shared data."""
-        return KrlFileName(source.name).is_from_elsewhere
+        return KrlFileName(source.name).is_apart
 
     def refuse(self, files: Sequence[KrlFile]) -> None:
         """Refuse submit programs, the controller's own accuracy and second values."""

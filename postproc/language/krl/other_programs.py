@@ -7,16 +7,15 @@ from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
-from postproc.files import FolderListing, find_beside, read_if_readable
+from postproc.files import FolderListing, read_if_readable
 from postproc.language.krl.files import (
     SHARED_LIST,
     USER_SOURCES,
     KrlFileName,
     find_in_archive,
 )
-from postproc.language.krl.program import read_krl
-from postproc.language.krl.shared_changes import list_imports, list_shared_changes
-from postproc.language.krl.symbols import HELD, KrlTask
+from postproc.language.krl.imports import list_imports
+from postproc.language.krl.symbols import HELD, list_changes
 from postproc.language.text.source import source_from_bytes
 from postproc.language.text.stamp import read_stamp
 
@@ -30,20 +29,27 @@ def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]
 
     Outputs and sources of the controller do not count.
     """
-    folder = program.absolute().parent
-    if not folder.is_dir():
-        return ()
+    found = listing.beside(program, _find_changing)
+    own = program.stem.lower()
+    return tuple(one for one in found if one.stem.lower() != own)
+
+
+def _find_changing(folder: Path, listing: FolderListing, but: str) -> list[Path]:
+    """Find programs of a folder, or of its archive, that change what all share."""
+    sources = find_in_archive(folder, KrlFileName.programs, listing)
+    others = [one for one in sources if one.name.lower() not in (but, *USER_SOURCES)]
+    if not others:
+        return []
     lists = find_in_archive(folder, (KrlFileName.data_lists,), listing)
     shared = HELD.union(*(_list_shared(one, *_version(one)) for one in lists))
     found: list[Path] = []
-    for other in find_in_archive(folder, KrlFileName.programs, listing):
-        if other.name.lower() in (program.name.lower(), *USER_SOURCES):
-            continue
-        changed, imports = _read_changes(other, *_version(other))
+    for other in others:
+        values = listing.named(other.parent, f"{other.stem}{KrlFileName.data_lists}")
+        own = [other] if values is None else [other, values]
+        changed, imports = _read_changes(*((one, *_version(one)) for one in own))
         if imports or not shared.isdisjoint(changed):
-            values = KrlFileName(str(other)).find_values()
-            found += [other] if values is None else [other, values]
-    return tuple(found)
+            found += own
+    return found
 
 
 def _version(path: Path) -> tuple[int, int]:
@@ -57,23 +63,25 @@ def _list_shared(path: Path, changed: int, size: int) -> frozenset[str]:
     """Return the words of a list with which it may declare data for all programs."""
     text = read_if_readable(path)
     if path.name.lower() != SHARED_LIST:
-        text = b"\n".join(_GLOBAL.findall(text))
+        some = _GLOBAL.findall(text) if b"global" in text.lower() else ()
+        text = b"\n".join(some)
     return frozenset(word.decode("latin-1").lower() for word in _WORD.findall(text))
 
 
 @lru_cache(READ_BEFORE)
-def _read_changes(path: Path, changed: int, size: int) -> tuple[frozenset[str], bool]:
-    """Return what a program may change of others' data, and whether it imports any."""
-    text = read_if_readable(path)
-    if KrlFileName(path.name).is_system_source(text) or read_stamp(text) is not None:
+def _read_changes(*versions: tuple[Path, int, int]) -> tuple[frozenset[str], bool]:
+    """Return what a program may change of others' data, and whether it imports any.
+
+    Args:
+        versions: The program and its data list, each as it is now.
+    """
+    texts = {path.name: read_if_readable(path) for path, _, _ in versions}
+    name, text = next(iter(texts.items()))
+    if KrlFileName(name).is_system_source(text) or read_stamp(text) is not None:
         return frozenset(), False
-    values = find_beside(path, f"{path.stem}{KrlFileName.data_lists}")
     try:
-        files = [
-            read_krl(source_from_bytes(one.name, read_if_readable(one)))
-            for one in (path, values) if one
-        ]  # fmt: skip
+        sources = [source_from_bytes(*one) for one in texts.items()]
+        changes = list_changes(*sources)
     except ProgramError:
         return frozenset(), False
-    changes = list_shared_changes(files, KrlTask(files).new_uses)
-    return frozenset(one.name for one in changes), bool(list_imports(files))
+    return frozenset(one.name for one in changes), bool(list_imports(sources))

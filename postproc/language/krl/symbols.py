@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +18,21 @@ from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.move_blocks import TargetSlots
+from postproc.language.analysis.shared_changes import (
+    SharedChange,
+    collect_changes,
+    describe_changes,
+    list_shared_changes,
+)
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
+from postproc.language.krl.imports import list_imports
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
-from postproc.language.krl.program import KrlFile
-from postproc.language.krl.shared_changes import (
-    SharedChange,
-    list_imports,
-    list_shared_changes,
-)
+from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.shifts import Pose, Shift, ShiftKind
+from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 from postproc.language.text.symbol_column import read_names
 
 CONFIG = "$config"
@@ -48,6 +52,8 @@ FIELDS: Mapping[str, Layout] = {
 }
 """Components of points by type."""
 WHOLE_NUMBERS = COMPONENTS[6:]
+ACTUAL = "_act"
+"""Ends names of data that programs set before each of their moves."""
 
 # What a program sets on its way: entries of tables, corrections, switches.
 
@@ -117,6 +123,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     by_name = True
     uncertain = ("/",)  # whole numbers divide otherwise than others
     apart = True
+    still_words = said.NAMES["move"]
 
     def new_uses(self) -> NamesUsed:
         """Return what knows moves and routines by name."""
@@ -134,7 +141,7 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def _imported(self) -> frozenset[tuple[str, str]]:
         """Lists and names of data that other programs import."""
-        found = list_imports(self.files_beside)
+        found = list_imports(_sources(self.files_beside))
         return frozenset((one.module, one.original) for one in found)
 
     @cached_property
@@ -142,11 +149,21 @@ class KrlTask(TaskSymbols[KrlFile]):
         """What other programs change of the data that all share, by name."""
         data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
         shared = HELD.union(one.name for k, one in data if self.shares(k, one))
-        found = dict[str, list[SharedChange]]()
-        for one in list_shared_changes(self.files_beside, self.new_uses):
-            if one.name in shared:
-                found.setdefault(one.name, []).append(one)
-        return found
+        programs = defaultdict[str, list[Source]](list)
+        for file in self.files_beside:
+            programs[file.name].append(file.text.source)
+        changes = (list_changes(*own) for own in programs.values())
+        return collect_changes(chain.from_iterable(changes), shared, self.start)
+
+    def name_for_others(self, name: str) -> str:
+        """Leave what programs set before each of their moves, see `TaskSymbols`."""
+        own = name.startswith("$") or name.endswith(ACTUAL)
+        return "" if own else self._own_imports.get(name, name)
+
+    @cached_property
+    def _own_imports(self) -> Mapping[str, str]:
+        """Names in other lists of what is imported."""
+        return {one.name: one.original for one in list_imports(_sources(self.files))}
 
     def outlives(self, datum: Datum) -> bool:
         """Return True for data of a list."""
@@ -193,9 +210,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             text = "is declared in none of the given files, or in several of them"
             return Code.UNDECLARED_VARIABLE, text
         if others := self.changed_elsewhere.get(name):
-            where = f"{others[0].file} (line {others[0].line})"
-            text = f"may be changed by {where}: set it before the moves that take it"
-            return code, text
+            return code, describe_changes(others)
         if name in self.written:
             text = "may be changed by the program: it is known only when that runs"
             return code, text
@@ -209,7 +224,7 @@ class KrlTask(TaskSymbols[KrlFile]):
         """
         found = set[str]()
         for file in (f for f in self.files if not f.is_submit):
-            words = file.text.words(file.text.of_kind(holds_odd), said.NAMES["move"])
+            words = file.text.words(file.text.of_kind(holds_odd), self.still_words)
             found |= words if file.routines else words.difference(TABLES)
         return frozenset(found)
 
@@ -259,15 +274,8 @@ class KrlTask(TaskSymbols[KrlFile]):
                     if target.name in arrays and not given:
                         routine = self.routine_around(number, row)
                         here = self.scope_of(routine) if routine else there
-                        found[target.name].add(self._index_of(target, here.at(row)))
+                        found[target.name].add(self.index_of(target, here.at(row)))
         return found
-
-    def _index_of(self, target: ir.DataObject, here: Scope) -> tuple[int, ...]:
-        """Return the index of an element, ANY where it is not known or an element."""
-        step = target.steps[0] if target.steps else ""
-        if isinstance(step, str) or any(data.steps for data in ir.data_in(step)):
-            return ANY
-        return self.index(step, here) or ANY
 
     def initial_switch(self, name: str) -> bool | None:
         """Return a switch that the program has not set so far, None if not known.
@@ -493,3 +501,14 @@ def _is_of_part(target: ir.DataObject) -> bool:
 def is_word(operand: ir.Operand | None, word: str) -> bool:
     """Return True if an operand is a word such as TRUE."""
     return operand == ir.DataObject(word)
+
+
+@lru_cache(KEPT_FILES)
+def list_changes(*sources: Source) -> tuple[SharedChange, ...]:
+    """List what a program with its data list changes of what all share."""
+    files = [parse_shared(read_krl, one) for one in sources]
+    return tuple(list_shared_changes(KrlTask(files)))
+
+
+def _sources(files: Sequence[KrlFile]) -> list[Source]:
+    return [one.text.source for one in files]

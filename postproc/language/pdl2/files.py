@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import PurePath
 from typing import ClassVar
 
 from postproc import _native
-from postproc.files import base_name
+from postproc.files import FolderListing, base_name
 from postproc.language.file_name import FileName, Named, Skip
 
 _WORDS = (b"import", b"routine", b"call")  # what names a program begins with one
@@ -16,6 +17,7 @@ _NAMED = re.compile(
     rb"|CALL[ \t]+(?P<called>\w+))",
     re.IGNORECASE | re.MULTILINE,
 )
+OTHER_PROGRAMS = "PROGRAMS/"
 _OUTSIDE = re.compile(r"[/\\:\0]|^\.*$")  # folders, drives, ``..``
 _PROGRAM_ARM = re.compile(
     rb"^[ \t]*PROGRAM\b[^\r\n]*?\bPROG_ARM[ \t]*=[ \t]*(\d{1,9})\b",
@@ -41,13 +43,15 @@ class Pdl2FileName(FileName):
         """
         return _TARGETS.search(data) is not None
 
-    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+    def find_named(
+        self, text: bytes, skip: Skip, listing: FolderListing
+    ) -> tuple[Named, Named]:
         r"""Find what IMPORT, EXPORTED FROM and CALL name.
 
         A routine may call a page behind a thousand moves: all of it is looked at.
 
         >>> text = b"PROGRAM m\nIMPORT 'Page1'\nIMPORT '../x'\nBEGIN\nEND m"
-        >>> Pdl2FileName("m.pdl").find_named(text, bool)
+        >>> Pdl2FileName("m.pdl").find_named(text, bool, FolderListing())
         ({'page1': 2}, {'../x': 3})
         """
         inside: Named = {}
@@ -63,6 +67,24 @@ class Pdl2FileName(FileName):
             else:
                 inside.setdefault(base_name(name), line)
         return inside, outside
+
+    def name_for(self, program: PurePath) -> str:
+        """Return its name in a job: that of another program, which it does not name.
+
+        >>> Pdl2FileName("b.pdl").name_for(PurePath("a.pdl"))
+        'PROGRAMS/b.pdl'
+        """
+        return f"{OTHER_PROGRAMS}{PurePath(self.place).name}"
+
+    @property
+    def is_from_elsewhere(self) -> bool:
+        """Tell whether it is the name of another program that changes variables."""
+        return self.is_apart
+
+    @property
+    def is_apart(self) -> bool:
+        """Tell by the folder that its name begins with."""
+        return self.place.startswith(OTHER_PROGRAMS)
 
     def arm(self, head: bytes) -> int:
         r"""Read the attribute PROG_ARM.

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.diagnostics import Code
 from postproc.files import base_name
+from postproc.language.analysis.shared_changes import describe_changes
 from postproc.language.language import matches
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.abstract_state import (
@@ -25,6 +26,7 @@ from postproc.language.pdl2.job import Place, World, base_variable
 from postproc.language.pdl2.machine import (
     OTHERS_WRITE,
 )
+from postproc.language.pdl2.other_programs import find_changes
 from postproc.language.pdl2.program import Program, Variable, Variables
 from postproc.language.pdl2.side_effects import (
     rows_effects,
@@ -138,7 +140,12 @@ def _find_written(world: World) -> set[str]:
 
 def fill_initial(world: World) -> None:
     """Enter declared initial values, constants and the variable file's values."""
-    world.changing = changing_variables(world)
+    world.changed_elsewhere = {
+        key: changes
+        for key, changes in find_changes(world.beside).items()
+        if not _is_constant(world, key)
+    }
+    world.changing = changing_variables(world) | world.changed_elsewhere.keys()
     world.imported = find_imported_points(world)
     for place, seen in world.declarations():
         _enter_declarations(world, place, seen)
@@ -222,9 +229,11 @@ def _enter_all(world: World, place: Place, file: VariableFile) -> None:
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = entries.row.rows
     own, exported = known.copy(), dict[str, int]()
+    elsewhere = {key.partition("/")[2] for key in world.changed_elsewhere}
     marked = _list_rows_where(
-        lambda v: v.taught or bool(v.exported), place.program, entries
-    )
+        lambda v: v.taught or bool(v.exported) or v.name.lower() in elsewhere,
+        place.program, entries,
+    )  # fmt: skip
     if world.start.taught:
         taught |= [world.is_listed(name) for name in entries.name]
     for row in marked:
@@ -233,11 +242,12 @@ def _enter_all(world: World, place: Place, file: VariableFile) -> None:
         declared = place.program.variables[root]
         taught[row] |= declared.taught
         shared[row] |= bool(declared.exported)
-        if known[row] and declared.exported:
+        key = world.root(place, root)
+        why = _why_untrusted(world, key)
+        if known[row] and (declared.exported or why):
             own[row] = False
-            key = world.root(place, root)
-            if key in world.imported:
-                world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
+            if why:
+                world.initial[key + name[len(root) :]] = Nothing(why)
             else:
                 exported[key + name[len(root) :]] = row
     for row in named[~known[named]].tolist():
@@ -291,6 +301,8 @@ def _why_untrusted(world: World, root: str) -> str:
     """Say why the first value of a variable is not taken from a file, else ""."""
     if root in world.imported:
         return IMPORTED
+    if others := world.changed_elsewhere.get(root):
+        return f"it {describe_changes(others)}"
     return OTHERS_WRITE if root in world.changing else ""
 
 

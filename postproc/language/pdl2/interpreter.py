@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -287,6 +287,7 @@ def resolve(
     start: Start | None = None,
     variables: VariableFile | None = None,
     others: Mapping[str, Program] | None = None,
+    beside: Sequence[Program] = (),
 ) -> JobReading:
     """Follow a program from its start and list every arrival with its origins.
 
@@ -299,8 +300,9 @@ def resolve(
         start: What the cell says, by default identity frames and nothing else.
         variables: The program's variable file.
         others: Programs named by IMPORT, CALL or EXPORTED FROM, by lower-case name.
+        beside: Other programs, which change variables that these export.
     """
-    world = World(program, dict(others or {}), start or Start(), variables)
+    world = World(program, dict(others or {}), start or Start(), variables, beside)
     fill_initial(world)
     machine = _follow(world)
     runs = 1

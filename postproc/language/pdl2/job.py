@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -13,6 +13,7 @@ from postproc.diagnostics import Code
 from postproc.files import base_name
 from postproc.language import ir
 from postproc.language.analysis.control_flow import ControlFlow
+from postproc.language.analysis.shared_changes import SharedChange
 from postproc.language.analysis.values import WrittenNumber
 from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
@@ -181,10 +182,12 @@ class World:
         main: The program that is compensated.
         others: Other programs, by lower-case program and file name.
         start: What the cell says.
+        beside: Programs that run at other times, or beside, and change variables.
         initial: What variables hold before the program assigns them, by key.
         changing: Exported variables, by key, that another program may write at any
-            time: numbers, texts and switches, no positions.
+            time: numbers, texts and switches, and positions that one at hand writes.
         imported: Positions of other programs, by key, whose file values may be old.
+        changed_elsewhere: Variables, by key, that programs beside these change.
         volatile: Names of variables and settings (with ``$``) that condition handlers
             may change at any time.
         taught_lines: Lines marked ``-- TAUGHT``, by file name.
@@ -199,6 +202,7 @@ class World:
     others: Mapping[str, Program]
     start: Start
     variables: ValueFile | None
+    beside: Sequence[Program] = ()
     initial: InitialValues = field(default_factory=InitialValues)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     loose: dict[str, str] = field(default_factory=dict)
@@ -207,6 +211,9 @@ class World:
     reached: dict[int, object] = field(default_factory=dict)
     changing: frozenset[str] = frozenset()
     imported: frozenset[str] = frozenset()
+    changed_elsewhere: Mapping[str, Sequence[SharedChange]] = field(
+        default_factory=dict
+    )
     volatile: frozenset[str] = frozenset()
     _said: set[tuple[str, str]] = field(default_factory=set)
     _kept: set[frozenset[int]] = field(default_factory=set)
@@ -222,7 +229,8 @@ class World:
     def numbering(self) -> Numbering:
         """The statements and numbers of all files, the variable file the last."""
         others = [] if self.variables is None else [self.variables.lines]
-        return Numbering([*(one.lines for one in self.programs()), *others])
+        programs = (*self.programs(), *self.beside)
+        return Numbering([*(one.lines for one in programs), *others])
 
     @property
     def arm(self) -> int:

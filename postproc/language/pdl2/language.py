@@ -5,21 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from postproc.arrays import release_memory
 from postproc.exceptions import ProgramError
-from postproc.files import base_name
+from postproc.files import FolderListing, base_name
 from postproc.language.insert_moves import Splitter
 from postproc.language.language import Cloner, JobReading, Language, Start
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.nested import name_parts
+from postproc.language.pdl2.other_programs import changing_programs
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.text.grammars import line_parser
 from postproc.language.text.number_edits import Skeleton
-from postproc.language.text.source import ParsedFiles, Source, parse_once
+from postproc.language.text.source import ParsedFiles, Source, parse_once, parse_shared
 from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
@@ -58,12 +60,16 @@ class Pdl2(Language):
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_other_arm(program, start)
         pages: list[Program] = []
+        beside: list[Program] = []
         variables: VariableFile | None = None
         texts = [Skeleton.of(program.lines)]
         for source in sources[1:]:
             if Pdl2FileName(source.name).is_variables:
                 variables = parse_once(known, source, read_variables)
                 texts.append(Skeleton.of(variables.lines))
+            elif Pdl2FileName(source.name).is_apart:
+                beside.append(parse_shared(parse, source))
+                texts.append(Skeleton.of(beside[-1].lines))
             else:
                 page = parse_once(known, source, parse)
                 # Where its PROGRAM line is not understood, its file names it.
@@ -71,7 +77,7 @@ class Pdl2(Language):
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
         release_memory(sum(len(text.numbers) for text in texts))
-        found = resolve(program, start, variables, others)
+        found = resolve(program, start, variables, others, beside)
         unreached = never_reached(found.missed, "the start", "program")
         every = (*found.diagnostics, *unreached)
         return replace(found, texts=tuple(texts), diagnostics=every)
@@ -80,8 +86,9 @@ class Pdl2(Language):
         """Parse the files of a job to clone variables in them."""
         from postproc.language.pdl2.clones import Pdl2Cloner
 
-        own = [one for one in sources if not Pdl2FileName(one.name).is_variables]
-        values = next((source for source in sources if source not in own), None)
+        own = _list_programs(sources)
+        lists = (one for one in sources if Pdl2FileName(one.name).is_variables)
+        values = next(lists, None)
         taken = {
             word.decode("ascii").lower()
             for source in sources
@@ -93,8 +100,7 @@ class Pdl2(Language):
         """Parse the files of a job to put points on the ways of its moves."""
         from postproc.language.pdl2.insert_moves import Pdl2Splitter
 
-        own = [one for one in sources if not Pdl2FileName(one.name).is_variables]
-        return Pdl2Splitter([parse(source) for source in own])
+        return Pdl2Splitter([parse(source) for source in _list_programs(sources)])
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
@@ -104,6 +110,10 @@ class Pdl2(Language):
             return name_parts(Source(file, b"\n".join(lines)), wanted)
         return super().target_names(file, lines, wanted)
 
+    def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
+        """Return other programs that change variables which a program exports."""
+        return changing_programs(program, listing)
+
     def prepare(self) -> None:
         """Load the parsers of programs and variable files."""
         for grammar in ("pdl2", "lsv"):
@@ -111,6 +121,12 @@ class Pdl2(Language):
 
 
 LANGUAGE = Pdl2
+
+
+def _list_programs(sources: Sequence[Source]) -> list[Source]:
+    """List the program and its pages."""
+    names = [(Pdl2FileName(one.name), one) for one in sources]
+    return [one for name, one in names if not (name.is_variables or name.is_apart)]
 
 
 def _refuse_other_arm(program: Program, start: Start) -> None:

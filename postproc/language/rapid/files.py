@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path, PurePath
-from stat import S_ISREG
 from typing import ClassVar
 
-from postproc.files import read_if_readable
+from postproc.files import FolderListing, read_if_readable
 from postproc.language.file_name import FileName, Named, Skip
 from postproc.language.measuring_program import is_measuring_program
 
 SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
-OTHER_TASKS = "TASKS/"
+OTHER_TASKS, OTHER_MODULES = "TASKS/", "MODULES/"
 _MAIN = re.compile(
     rb"^[ \t]*(?:LOCAL[ \t]+)?PROC[ \t]+main[ \t]*\(", re.IGNORECASE | re.MULTILINE
 )
@@ -23,8 +20,8 @@ _MAIN = re.compile(
 class RapidFileName(FileName):
     """A file by its name, as RAPID takes it: every module belongs to those beside it.
 
-    Files that a job has from other folders of a backup have names with a folder: of
-    its system modules, or of another task.
+    Files that a job has from elsewhere have names with a folder: system modules of a
+    backup, modules of other tasks, and modules beside it that do not belong to it.
     """
 
     programs: ClassVar = (".mod", ".modx", ".prg", *SYSTEM_SUFFIXES)
@@ -32,7 +29,16 @@ class RapidFileName(FileName):
     @property
     def is_from_elsewhere(self) -> bool:
         """Tell by the folder that its name begins with."""
-        return self.place.startswith((SYSTEM_MODULES, OTHER_TASKS))
+        return self.place.startswith((SYSTEM_MODULES, OTHER_TASKS, OTHER_MODULES))
+
+    @property
+    def is_apart(self) -> bool:
+        """Tell whether it is read for what it changes, and is no part of the task.
+
+        >>> RapidFileName("MODULES/job.mod").is_apart
+        True
+        """
+        return self.place.startswith((OTHER_TASKS, OTHER_MODULES))
 
     @property
     def is_named_as_system(self) -> bool:
@@ -64,7 +70,9 @@ class RapidFileName(FileName):
         """Return its folder: the modules of a task are one job."""
         return self.place.rpartition("/")[0]
 
-    def find_named(self, text: bytes, skip: Skip) -> tuple[Named, Named]:
+    def find_named(
+        self, text: bytes, skip: Skip, listing: FolderListing
+    ) -> tuple[Named, Named]:
         """Name all modules beside the one with the main routine of a task.
 
         A survey is a task by itself, wherever it stands.
@@ -73,7 +81,9 @@ class RapidFileName(FileName):
         if found is None or is_measuring_program(text):
             return {}, {}
         line = text.count(b"\n", 0, found.start()) + 1
-        beside = _modules_beside(Path(self.place), skip)
+        place = Path(self.place)
+        modules = listing.once(place.parent, _list_parts)
+        beside = (one for one in modules if one.name != place.name and not skip(one))
         return {RapidFileName(other.name).key: line for other in beside}, {}
 
     def name_for(self, program: PurePath) -> str:
@@ -84,34 +94,24 @@ class RapidFileName(FileName):
         'SYSMOD/user.sys'
         >>> RapidFileName("RAPID/TASK2/PROGMOD/plc.mod").name_for(job)
         'TASKS/TASK2/PROGMOD/plc.mod'
+        >>> RapidFileName("RAPID/TASK1/PROGMOD/set.mod").name_for(job)
+        'MODULES/set.mod'
         """
         path = PurePath(self.place)
-        if self.runs_beside(program):
+        if path.parent.parent != program.parent.parent:
             return OTHER_TASKS + "/".join(path.parts[-3:])
+        if path.parent == program.parent:
+            return f"{OTHER_MODULES}{path.name}"
         return f"{SYSTEM_MODULES}{path.name}"
-
-    def runs_beside(self, program: PurePath) -> bool:
-        """Tell by the folders of tasks."""
-        return PurePath(self.place).parent.parent != program.parent.parent
 
 
 FILES = RapidFileName
 
 
-def _modules_beside(path: Path, skip: Skip) -> Iterator[Path]:
-    """Yield the other modules of a folder, but for main ones and those to skip."""
-    for other in sorted(path.parent.iterdir()):
-        ours = RapidFileName(other.name).is_program and other.name != path.name
-        if not ours or other.is_symlink():
-            continue
-        status = other.stat()
-        if S_ISREG(status.st_mode) and not (
-            _has_main(other, status.st_mtime_ns, status.st_size) or skip(other)
-        ):
-            yield other
-
-
-@lru_cache(maxsize=8192)
-def _has_main(path: Path, changed: int, size: int) -> bool:
-    """Tell whether a module, as it is at a time, has the main routine of its task."""
-    return _MAIN.search(read_if_readable(path)) is not None
+def _list_parts(folder: Path, listing: FolderListing) -> list[Path]:
+    """List the modules of a folder that have no main routine of a task."""
+    modules = listing.ending(folder, RapidFileName.programs)
+    return [
+        one for one in modules
+        if not (one.is_symlink() or _MAIN.search(read_if_readable(one)))
+    ]  # fmt: skip

@@ -21,6 +21,7 @@ from postproc.language.analysis.found_goals import (
     not_reached,
 )
 from postproc.language.analysis.move_blocks import TargetSlots
+from postproc.language.analysis.shared_changes import describe_changes
 from postproc.language.analysis.values import (
     Value,
     WrittenNumber,
@@ -331,6 +332,8 @@ class RapidGoal(goals.GoalReader):
         elif self.task.is_changed_beside(*found):
             code = Code.BESIDE_PROGRAM
             text = f"may be changed by another task at any time: {goals.RUN_TIME}"
+        elif others := self.task.changed_elsewhere.get(name):
+            text = describe_changes(others)
         elif self.task.constant(name, self.here) is None:
             text = f"may be changed by the program: {goals.RUN_TIME}"
         else:

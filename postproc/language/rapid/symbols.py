@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Container, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from itertools import chain
 
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import TaskFrame
 from postproc.language.analysis.declarations import Datum, TaskRoutine
 from postproc.language.analysis.move_blocks import TargetSlots
+from postproc.language.analysis.shared_changes import (
+    SharedChange,
+    collect_changes,
+    list_shared_changes,
+)
 from postproc.language.analysis.symbols import DEEPEST, TaskSymbols
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import (
@@ -35,8 +41,9 @@ from postproc.language.rapid.instructions import (
     read_controller_data,
 )
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT, WIDTH
-from postproc.language.rapid.program import RapidFile
+from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.shifts import Shift, ShiftKind
+from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
 """Functions whose first argument is a target."""
@@ -68,7 +75,6 @@ RECORDS: Mapping[str, Layout] = {
 """Components of data by type."""
 COUNTS: tuple[tuple[int, ...], ...] = ((3, 4, 4, 6), (6, 6))
 """How many numbers stand in the parts of a robtarget, and of a jointtarget."""
-_READING_MOVES = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
 
 
 @dataclass
@@ -85,6 +91,7 @@ class RapidTask(TaskSymbols[RapidFile]):
     followed = (*RECORDS, "num", "bool")
     targets = ("robtarget", "jointtarget")
     functions = "func"
+    still_words = frozenset(name for name, one in MOTIONS.items() if one.given < 0)
     controller_data = staticmethod(read_controller_data)
     frames: dict[tuple[object, ...], TaskFrame] = field(default_factory=dict)
     conditions: dict[tuple[object, ...], tuple[TaskFrame, TaskFrame, float, float]] = (
@@ -156,7 +163,8 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     def note_odd(self, uses: NamesUsed) -> None:
         """Note words of what is not understood; but a move sets nothing."""
-        uses.changed |= self.words_of_odd(_READING_MOVES)
+        uses.changed |= self.words_of_odd(self.still_words)
+        uses.written |= self.changed_elsewhere.keys()
         uses.read |= self.odd_words
 
     def bind(
@@ -166,14 +174,33 @@ class RapidTask(TaskSymbols[RapidFile]):
         bound = super().bind(routine, call, there)
         return self.scope_of(routine) if self.sets_by_string and bound else bound
 
+    # What other modules do of the same task, or what ran before it.
+
+    @cached_property
+    def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
+        """What other modules change of the data that they share, by name."""
+        data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
+        shared = {
+            one.name for k, one in data
+            if one.kind != "const" and not one.routine and self.shares(k, one)
+        }  # fmt: skip
+        others = (one for one in self.files_beside if not _task_of(one))
+        changes = chain.from_iterable(list_changes(one.text.source) for one in others)
+        every = (
+            replace(one, name=name)
+            for one in changes
+            for name in ([one.name] if one.name else shared)
+        )
+        return collect_changes(every, shared, self.start)
+
     # What other tasks do: global persistents of one name are the same data.
 
     @cached_property
     def others(self) -> Sequence[RapidTask]:
         """The tasks that run at the same time, by the names of their files."""
         tasks = defaultdict[str, list[RapidFile]](list)
-        for file in self.files_beside:
-            tasks[RapidFileName(file.text.source.name).task_beside].append(file)
+        for file in filter(_task_of, self.files_beside):
+            tasks[_task_of(file)].append(file)
         return [RapidTask(own) for own in tasks.values()]
 
     def is_changed_beside(self, file: int, datum: Datum) -> bool:
@@ -230,7 +257,14 @@ class RapidTask(TaskSymbols[RapidFile]):
     @cached_property
     def sets_by_string(self) -> bool:
         """Whether an instruction sets data that it is given the names of in texts."""
-        return bool(BY_STRING & self.find_calls)
+        return any(self.changes_by_string)
+
+    @property
+    def changes_by_string(self) -> Iterator[SharedChange]:
+        """Where those stand."""
+        for text in (file.text for file in self.files):
+            for row in text.of_kind(_sets_by_string):
+                yield SharedChange("", (), text.source.name, text.line(row))
 
     @cached_property
     def calls_by_text(self) -> bool:
@@ -288,6 +322,17 @@ class RapidTask(TaskSymbols[RapidFile]):
 
 
 _PLACE_AND_TURN = slice(3), slice(3, 7)
+
+
+def _sets_by_string(one: ir.SourceStatement) -> bool:
+    """Return True if a statement sets data by a name in a text."""
+    one = ir.inside(one)
+    return isinstance(one, ir.Instruction) and one.name in BY_STRING
+
+
+def _task_of(file: RapidFile) -> str:
+    """Return the task that a file belongs to which runs beside, "" for none."""
+    return RapidFileName(file.text.source.name).task_beside
 
 
 def _is_shared(datum: Datum) -> bool:
@@ -355,3 +400,10 @@ def as_assignment(
         case "add", (ir.DataObject() as target, ir.Operand() as by):
             return ir.Assignment(target, ir.Operation("+", (target, by)))
     return None
+
+
+@lru_cache(KEPT_FILES)
+def list_changes(source: Source) -> tuple[SharedChange, ...]:
+    """List what a module changes of others' data, without a name of any of them."""
+    task = RapidTask([parse_shared(read_rapid, source)])
+    return (*task.changes_by_string, *list_shared_changes(task))

@@ -7,7 +7,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar, overload
 
@@ -21,6 +21,7 @@ from postproc.exceptions import PostprocError, ProgramError
 AT_ONCE = 50_000  # edits that are Python objects at the same time
 T = TypeVar("T")
 LAST = 2**31 - 1  # offset in a file; none that is read is as long
+KEPT_FILES = 256  # files that are kept as they were read
 
 
 class Span(NamedTuple):
@@ -276,6 +277,12 @@ def parse_once(
         known[source.name] = source, parse(source)
     found: T = known[source.name][1]
     return found
+
+
+@lru_cache(KEPT_FILES)
+def parse_shared(parse: Callable[[Source], T], source: Source) -> T:
+    """Parse a file that many programs of a folder read, once for all of them."""
+    return parse(source)
 
 
 def source_from_bytes(name: str, data: bytes) -> Source:

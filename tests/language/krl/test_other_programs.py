@@ -17,7 +17,7 @@ SET = ["BASE_DATA[2]={X 9,Y 0,Z 0,A 0,B 0,C 0}"]
 SHARED = DATA.replace("DECL E6POS XP1", "DECL GLOBAL E6POS XP1")
 
 
-def read(lines, other, values="", data=DATA):
+def read(lines, other, values="", data=DATA, constant=()):
     files = {
         "m.src": "DEF m( )\n{}\nEND\n".format("\n".join(lines)),
         "m.dat": f"DEFDAT m PUBLIC\n{data}\nENDDAT\n",
@@ -26,7 +26,7 @@ def read(lines, other, values="", data=DATA):
         "PROGRAMS/o.dat": f"DEFDAT o\n{values}\nENDDAT\n",
     }
     sources = [Source(name, text.encode()) for name, text in files.items()]
-    return Krl().read(sources, Start())
+    return Krl().read(sources, Start(constant=constant))
 
 
 @pytest.mark.parametrize(
@@ -56,6 +56,21 @@ def test_what_another_program_changes_is_not_known(change, data):
 )
 def test_what_is_not_shared_does_no_harm(change, values, data):
     assert reasons(read(FRAMES, change, values, data)) == [""]
+
+
+@pytest.mark.parametrize(
+    ("constant", "known"),
+    [("base_data[2]", True), ("base_data", True), ("base_*", True),
+     ("base_data[1]", False), ("tool_data", False)],
+)  # fmt: skip
+def test_what_the_cell_calls_constant_is_known(constant, known):
+    (why,) = reasons(read(FRAMES, "BASE_DATA[2].X=5", constant=(constant,)))
+    assert (why == "") == known
+
+
+def test_an_index_that_is_not_known_may_be_any():
+    found = read(FRAMES, "BASE_DATA[i].X=5", constant=("base_data[2]",))
+    assert reasons(found) != [""]
 
 
 def test_what_a_program_sets_by_itself_is_known():
