@@ -359,31 +359,31 @@ class World:
                     seen = seen.some(first.own_names | body.own_names)
                 yield self.place(program, body), seen
 
-    @cached_property
-    def spelling(self) -> Mapping[str, str]:
-        """Return how variables are written, by key: as where they come first."""
-        found: dict[str, str] = {}
-        for place, seen in self.declarations():
-            own = [variable.name for variable in place.body.variables.values()]
-            for name in (*seen.list_names(), *own):
-                found.setdefault(self.root(place, name.lower()), name)
-        if self.variables is not None and self.main.main is not None:
-            place = self.place(self.main, self.main.main)
-            entries = self.variables.entries
-            for name, row in entries.row.items():
-                root = root_of(name)
-                key = self.root(place, root) + name[len(root) :]
-                if key in self.initial:
-                    found.setdefault(key, entries.name[row])
-        return found
-
     def spell(self, key: str) -> str:
-        """Return how a variable or element is written."""
-        if key in self.spelling:
-            return self.spelling[key]
+        """Return how a variable is written where it is declared first.
+
+        Elements, and what is not declared, are written as in the variable file.
+        """
         root = base_variable(key)
-        written = self.spelling.get(root, root.split("/", 1)[-1])
-        return written + key[len(root) :]
+        declared, rest = self._find_declared(root), key[len(root) :]
+        name = declared.name if declared else root.rpartition("/")[2]
+        if self.variables is None or self.main.main is None or (declared and not rest):
+            return name + rest
+        place, entries = self.place(self.main, self.main.main), self.variables.entries
+        row = entries.row.get(name.lower() + rest, -1)
+        own = self.root(place, name.lower()) == root and key in self.initial
+        return entries.name[row] if own and row >= 0 else name + rest
+
+    def _find_declared(self, root: str) -> Variable | None:
+        """Return the first declaration of a variable, by its key."""
+        where, _, name = root.rpartition("/")
+        file, _, routine = where.partition(":")
+        for program in self.programs():
+            own = program.routines.get(routine) if routine else program
+            declared = own and own.variables.get(name)
+            if declared and (declared.exported or program.name) == file:
+                return declared
+        return None
 
     def type_of(self, place: Place, name: str) -> ast.Type | None:
         """Return the declared type of a name."""

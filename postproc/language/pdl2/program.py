@@ -183,10 +183,6 @@ class Variables(Mapping[str, Variable]):
         """Return the lower-case names."""
         return self._names
 
-    def list_names(self) -> list[str]:
-        """Return the names as they are written, in order."""
-        return [self._written[at] for at in self._at]
-
     def which(self, test: Callable[[Variable], bool]) -> list[str]:
         """List the lower-case names whose declaration passes a test, in order.
 

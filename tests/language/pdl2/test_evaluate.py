@@ -88,3 +88,19 @@ BEGIN
 def test_a_parameter_hides_a_variable_of_another_arm():
     found = visits("go(POS(2, 2, 3, 4, 5, 6, ''))", head=HIDING)
     assert found.target.values[:, 0].tolist() == [1.0]
+
+
+def test_a_variable_is_named_as_it_is_declared():
+    head = "PROGRAM job\nVAR MyPoint : POSITION\nBEGIN\n"
+    found = visits("mypoint := POS(1, 2, 3, 4, 5, 6, '')", "MOVE TO MYPOINT", head=head)
+    assert found.target.names[found.target.name[0]] == "MyPoint"
+
+
+def test_one_assignment_asks_for_few_of_many_variables():
+    many = "\n".join(f"  wp_{k} : POSITION" for k in range(500))
+    text = (
+        f"PROGRAM job\nVAR\n{many}\nBEGIN\nwp_7 := POS(1, 2, 3, 4, 5, 6, '')\nEND job"
+    )
+    program = parse(source_from_bytes("job.pdl", text.encode()))
+    resolve(program)
+    assert len(program.variables._made) < 5

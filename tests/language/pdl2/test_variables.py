@@ -20,7 +20,7 @@ def test_the_last_declaration_counts_in_the_place_of_the_first() -> None:
     assert found["p1"].name == "P1" and found.get("P1") is None
     found.declare(["P2"], Variable("", 9))
     assert found["p2"] == Variable("P2", 9)
-    assert found.list_names() == ["P1", "P2", "n", "Q"]
+    assert [found[name].name for name in found] == ["P1", "P2", "n", "Q"]
 
 
 def test_names_are_told_by_their_declarations() -> None:
