@@ -94,8 +94,12 @@ class Effects(NamedTuple):
 
 def list_invoked(world: World, place: Place, *nodes: ir.Node) -> list[ir.FunctionCall]:
     """List the calls in nodes that may have effects, those by a name alone, too."""
-    found = [call for call in ir.calls_in(*nodes) if call.name not in PURE]
-    names = {r.name for r in ir.data_in(*nodes) if not r.steps}
+    found, names = list[ir.FunctionCall](), set[str]()
+    for part in ir.walk(*nodes):
+        if isinstance(part, ir.FunctionCall):
+            found += [part] if part.name not in PURE else []
+        elif isinstance(part, ir.DataObject) and not part.steps:
+            names.add(part.name)
     alone = sorted(name for name in names if world.is_function(place, name))
     return found + [ir.FunctionCall(name, ()) for name in alone]
 
