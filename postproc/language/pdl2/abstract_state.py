@@ -162,8 +162,17 @@ class Store:
         self.last = NOWHERE
 
     def set(self, **settings: Value) -> None:
-        """Change frames or motion variables (names without ``$``)."""
-        self.settings = {**self.settings, **settings}
+        """Change frames or motion variables (names without ``$``).
+
+        Those are the same settings after a number, a text or a switch that they have.
+        """
+        if not all(self._has(*setting) for setting in settings.items()):
+            self.settings = {**self.settings, **settings}
+
+    def _has(self, name: str, value: Value) -> bool:
+        held = self.settings.get(name)
+        plain = isinstance(value, float | bool | str) and type(held) is type(value)
+        return plain and held == value
 
     def forget_frames(self, why: str) -> None:
         """Which frames hold is no longer known."""

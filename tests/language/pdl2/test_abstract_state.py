@@ -63,3 +63,15 @@ def test_an_element_that_is_forgotten_again_is_entered_once() -> None:
     for _ in range(5):
         store.forget("job/tab[1]", Nothing("it may change"))
     assert store.logs.get("job/tab") == ("job/tab[1]", None)
+
+
+def test_a_number_that_is_set_once_more_leaves_the_same_settings() -> None:
+    store = Store(unset)
+    store.set(lin_spd=0.2, move_type="linear")
+    before = store.settings
+    store.set(lin_spd=0.2)
+    assert store.settings is before
+    for other in (0.3, Nothing("read"), Nothing("read again"), True, 1.0):
+        store.set(lin_spd=other)
+        assert store.settings is not before and store.settings["lin_spd"] is other
+        before = store.settings
