@@ -133,6 +133,9 @@ def calls_in_expressions(
     machine: Machine, here: Execution, statement: ir.SourceStatement
 ) -> None:
     """Let the function calls inside of a statement have their effects."""
+    program = here.place.program
+    if not program.calling[program.lines.shape[here.row]]:
+        return
     for call in machine.find_calls(here.place, statement):
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:

@@ -21,6 +21,7 @@ from postproc.language.pdl2.pose_encoding import COMMENTS
 from postproc.language.text.source import Source
 from postproc.language.text.statement_table import Statements, read_lines
 from postproc.language.text.symbol_column import NameColumn
+from postproc.language.text.templates import name_index
 from postproc.language.visits import Diagnostic
 
 ProgramLines = Statements[ir.SourceStatement]
@@ -273,6 +274,21 @@ class Program:
     def bodies(self) -> tuple[Body, ...]:
         """Its main part, if it has one, and its routines."""
         return tuple(one for one in (self.main, *self.routines.values()) if one)
+
+    @cached_property
+    def calling(self) -> Bools:
+        """Which shapes of its lines may call a function in an expression, (k,)."""
+        own = {*self.routines, *self.outside}
+        numbered = any(not name.isalpha() for name in own)
+
+        def may_call(part: ir.Node) -> bool:
+            if isinstance(part, ir.FunctionCall):
+                return part.name not in ast.NAMES["pure"]
+            if not isinstance(part, ir.DataObject) or part.steps:
+                return False
+            return part.name in own or (numbered and name_index(part.name) >= 0)
+
+        return self.lines.said.which(lambda one: any(map(may_call, ir.walk(one))))
 
     @property
     def handlers(self) -> list[tuple[int, int]]:
