@@ -70,4 +70,4 @@ def test_what_programs_share_is_looked_for_once_a_folder(tmp_path, monkeypatch, 
     opened.clear()
     for unit in found.units:
         language_of(unit.program).reads(tmp_path / unit.program, listing)
-    assert not opened
+    assert len(opened) <= len(found.units)  # but for each program itself

@@ -11,6 +11,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.declarations import TaskFile
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd
@@ -31,6 +32,43 @@ class SharedChange:
     index: tuple[int, ...]
     file: str
     line: int
+
+
+@dataclass(frozen=True)
+class OutsideCall:
+    """A call of a routine that the program does not hold.
+
+    Attributes:
+        name: Of the routine.
+        file, line: Where the call stands.
+    """
+
+    name: str
+    file: str
+    line: int
+
+
+def list_outside_calls(task: TaskSymbols[Any]) -> Iterator[OutsideCall]:
+    """Yield the first call of each routine that other programs may hold."""
+    for file in (one for one in task.files if one.routines):
+        names = {*ir.names_called(*file.text.said.said)} - task.routines.keys()
+        for row in file.text.where(lambda one: bool(ir.names_called(one))):
+            for name in ir.names_called(file.text.statement(row)) & names:
+                names.discard(name)
+                at = file.text.source.name, file.text.line(row)
+                yield OutsideCall(name, *at)
+            if not names:
+                break
+
+
+def describe_call(call: OutsideCall) -> str:
+    """Say why a routine begins anywhere, and what to do about it."""
+    where = f"{call.file.rpartition('/')[2]} (line {call.line})"
+    return (
+        f"{call.name.upper()} is called by {where} too: place, frames, load and modes "
+        "at its beginning are not known. Set them in it, and begin with a move by "
+        "joint angles"
+    )
 
 
 def describe_changes(changes: Sequence[SharedChange]) -> str:

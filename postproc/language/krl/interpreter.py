@@ -14,6 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
+from postproc.language.analysis.shared_changes import describe_call
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
     MOVES,
@@ -111,11 +112,29 @@ class KrlMachine(TaskMachine):
         first = self.task.files[0]
         here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
-        self.call_routine(main, None, here)
+        if main.rows.head.name not in self.task.outside_calls:
+            self.call_routine(main, None, here)
+        self._begin_anywhere(here)
         self.follow()
         for name, (file, row) in self._assumed.items():
             place, text = Scope(file, "", "", row=row), f"{name.upper()} {ASSUMED}"
             self.say(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
+
+    def _begin_anywhere(self, here: Arrived) -> None:
+        """Begin the routines that other programs call, wherever these are then.
+
+        Modes are those of any program as long as none sets others.
+        """
+        kept = {"orientation", "interpolation"} - self.task.outside_modes
+        own = {name: getattr(here.modes, name) for name in kept}
+        lost = here.forget()
+        lost = replace(lost, modes=lost.modes.with_(**own))
+        for name, call in self.task.outside_calls.items():
+            for one in self.task.routines[name]:
+                if not one.rows.head.local:
+                    place = Scope(one.file, "", "", row=one.rows.first)
+                    self.say(place, Code.CALLED_BY_OTHERS, describe_call(call))
+                    self.call_routine(one, None, lost)
 
     # What a statement is.
 

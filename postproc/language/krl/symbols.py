@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +20,11 @@ from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.shared_changes import (
+    OutsideCall,
     SharedChange,
     collect_changes,
     describe_changes,
+    list_outside_calls,
     list_shared_changes,
 )
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
@@ -149,11 +152,31 @@ class KrlTask(TaskSymbols[KrlFile]):
         """What other programs change of the data that all share, by name."""
         data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
         shared = HELD.union(one.name for k, one in data if self.shares(k, one))
-        programs = defaultdict[str, list[Source]](list)
+        changes = chain.from_iterable(list_changes(*own) for own in self._others)
+        return collect_changes(changes, shared, self.start)
+
+    @cached_property
+    def outside_calls(self) -> Mapping[str, OutsideCall]:
+        """Calls by other programs of routines that they know, the first of each."""
+        known = {
+            one.rows.head.name for one in self.every_routine if not one.rows.head.local
+        }
+        calls = chain.from_iterable(list_calls(*own) for own in self._others)
+        return {one.name: one for one in calls if one.name in known}
+
+    @cached_property
+    def outside_modes(self) -> frozenset[str]:
+        """Modes that other programs may leave otherwise than a program begins."""
+        found = (find_modes(one) for one in _sources(self.files_beside))
+        return frozenset[str]().union(*found)
+
+    @cached_property
+    def _others(self) -> Sequence[Sequence[Source]]:
+        """Other programs, each with its data list."""
+        found = defaultdict[str, list[Source]](list)
         for file in self.files_beside:
-            programs[file.name].append(file.text.source)
-        changes = (list_changes(*own) for own in programs.values())
-        return collect_changes(chain.from_iterable(changes), shared, self.start)
+            found[file.name].append(file.text.source)
+        return [*found.values()]
 
     def name_for_others(self, name: str) -> str:
         """Leave what programs set before each of their moves, see `TaskSymbols`."""
@@ -508,6 +531,27 @@ def list_changes(*sources: Source) -> tuple[SharedChange, ...]:
     """List what a program with its data list changes of what all share."""
     files = [parse_shared(read_krl, one) for one in sources]
     return tuple(list_shared_changes(KrlTask(files)))
+
+
+@lru_cache(KEPT_FILES)
+def list_calls(*sources: Source) -> tuple[OutsideCall, ...]:
+    """List the routines that a program calls and does not hold."""
+    files = [parse_shared(read_krl, one) for one in sources]
+    return tuple(list_outside_calls(KrlTask(files)))
+
+
+_MODE = re.compile(
+    rb"\b(?:(?P<orientation>ORI_TYPE?)|(?P<interpolation>IPO_MODE|IPO_FRAME))"
+    rb"[ \t]*(?:=[ \t]*|[ \t](?=#))(?!#?(?:VAR|BASE|SIPO_MODE|SORI_TYP)\b)",
+    re.IGNORECASE,
+)
+
+
+@lru_cache(KEPT_FILES)
+def find_modes(source: Source) -> frozenset[str]:
+    """Name the modes that a program, or its list, sets to others than at its begin."""
+    found = _MODE.finditer(source.data)
+    return frozenset(one.lastgroup or "" for one in found)
 
 
 def _sources(files: Sequence[KrlFile]) -> list[Source]:

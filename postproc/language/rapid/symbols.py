@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -45,6 +46,7 @@ from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 
+_WORD, _UNREAD = re.compile(rb"[a-z]\w*"), re.compile(rb'"[^"\n]*"|![^\n]*')
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
 """Functions whose first argument is a target."""
 
@@ -175,6 +177,18 @@ class RapidTask(TaskSymbols[RapidFile]):
         return self.scope_of(routine) if self.sets_by_string and bound else bound
 
     # What other modules do of the same task, or what ran before it.
+
+    def is_exported(self, datum: Datum) -> bool:
+        """Return True for data of all modules that a module beside names."""
+        own = datum.scope == "local" or bool(datum.routine)
+        return not own and datum.name in self._named_elsewhere
+
+    @cached_property
+    def _named_elsewhere(self) -> frozenset[str]:
+        """Names in modules beside that these do not declare."""
+        others = (one for one in self.files_beside if not _task_of(one))
+        names = (list_names(one.text.source) for one in others)
+        return frozenset[str]().union(*names)
 
     @cached_property
     def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
@@ -407,3 +421,12 @@ def list_changes(source: Source) -> tuple[SharedChange, ...]:
     """List what a module changes of others' data, without a name of any of them."""
     task = RapidTask([parse_shared(read_rapid, source)])
     return (*task.changes_by_string, *list_shared_changes(task))
+
+
+@lru_cache(KEPT_FILES)
+def list_names(source: Source) -> frozenset[str]:
+    """List the words of a module that are no names of data which it declares."""
+    words = frozenset(_WORD.findall(_UNREAD.sub(b" ", source.data.lower())))
+    file = parse_shared(read_rapid, source)
+    own = {one.name for one in file.data if not one.routine}
+    return frozenset(word.decode("latin-1") for word in words) - own

@@ -7,7 +7,7 @@ import pytest
 from postproc.compensation.program_files import find_pages
 from postproc.files import FolderListing
 from postproc.language.krl.language import Krl
-from postproc.language.krl.other_programs import changing_programs
+from postproc.language.krl.other_programs import find_other_programs
 from postproc.language.language import Start
 from postproc.language.text.source import Source
 from tests.language.krl.test_visits import CONFIG, DATA, reasons
@@ -123,7 +123,7 @@ def test_programs_that_are_read(tmp_path, files, expected, folder):
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    found = changing_programs(tmp_path / "Program/m.src", FolderListing())
+    found = find_other_programs(tmp_path / "Program/m.src", FolderListing())
     assert [path.name for path in found] == expected
 
 
