@@ -71,9 +71,17 @@ def describe_call(call: OutsideCall) -> str:
     )
 
 
-def describe_changes(changes: Sequence[SharedChange]) -> str:
-    """Say why data are not known that others change, and what to do about it."""
-    first = changes[0]
+def describe_changes(
+    changes: Sequence[SharedChange], index: tuple[int, ...] = ()
+) -> str:
+    """Say why data are not known that others change, and what to do about it.
+
+    Args:
+        changes: All changes of the data.
+        index: Of the element that is meant.
+    """
+    own = (one for one in changes if not index or one.index in ((), index))
+    first = next(own, changes[0])
     where = f"{first.file.rpartition('/')[2]} (line {first.line})"
     return (
         f"may be changed by {where}: set it before the moves that take it, or, if that "

@@ -149,7 +149,7 @@ class FrameReader:
             taught = self.task.is_taught(table, found[0], found[1].row)
             if pose:
                 return self._make(pose, taught)
-        return TaskFrame((), self._unknown(shown, table))
+        return TaskFrame((), self._unknown(shown, table, (number,)))
 
     def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
@@ -165,8 +165,8 @@ class FrameReader:
         free = isinstance(value, KnownRecord) and value.number("mach_def_index") == 0.0
         return not free
 
-    def _unknown(self, shown: str, name: str) -> Reason:
-        code, text = self.task.explain_unknown(name, self.here)
+    def _unknown(self, shown: str, name: str, index: tuple[int, ...] = ()) -> Reason:
+        code, text = self.task.explain_unknown(name, self.here, index)
         where = f" ({CONFIG}.dat)" if code is Code.UNDECLARED_VARIABLE else ""
         return Reason(code, f"{shown} {text}{where}")
 

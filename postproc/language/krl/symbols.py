@@ -224,8 +224,16 @@ class KrlTask(TaskSymbols[KrlFile]):
         first = {file.name: number for number, file in reversed(by_kind)}
         return [first[file.name] for file in self.files]
 
-    def explain_unknown(self, name: str, here: Scope) -> tuple[Code, str]:
-        """Say why a name stands for no known value; the text goes behind the name."""
+    def explain_unknown(
+        self, name: str, here: Scope, index: tuple[int, ...] = ()
+    ) -> tuple[Code, str]:
+        """Say why a name stands for no known value; the text goes behind the name.
+
+        Args:
+            name: The name.
+            here: Where it stands.
+            index: Of an element.
+        """
         code = Code.RUNTIME_VALUE
         if name in here.parameters:
             return code, "is a parameter: what is given for it is not followed"
@@ -233,7 +241,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             text = "is declared in none of the given files, or in several of them"
             return Code.UNDECLARED_VARIABLE, text
         if others := self.changed_elsewhere.get(name):
-            return code, describe_changes(others)
+            return code, describe_changes(others, index)
         if name in self.written:
             text = "may be changed by the program: it is known only when that runs"
             return code, text

@@ -73,6 +73,12 @@ def test_an_index_that_is_not_known_may_be_any():
     assert reasons(found) != [""]
 
 
+def test_the_change_of_the_element_is_named():
+    other = "BASE_DATA[4].X=1\nBASE_DATA[2].X=1"
+    (why,) = reasons(read(FRAMES, other))
+    assert "o.src (line 3)" in why
+
+
 def test_what_a_program_sets_by_itself_is_known():
     assert reasons(read(SET + FRAMES, "BASE_DATA[2].X=5")) == [""]
 

@@ -9,7 +9,9 @@ from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
 from postproc.language.rapid.other_modules import find_other_modules
 from postproc.language.text.source import Source
+from postproc.language.text.stamp import stamp_line
 from tests.golden.rapid_cases import DATA, go, module
+from tests.language.rapid.test_system_modules import compensated, folder  # noqa: F401
 
 POINT = next(line for line in DATA if "robtarget p1:" in line)
 TOOL = next(line for line in DATA if "tooldata t:" in line)
@@ -124,3 +126,11 @@ def test_modules_that_are_read(tmp_path, body, declared, expected):
     (tmp_path / "o.mod").write_text(other(body, declared))
     found = find_other_modules(tmp_path / "job.mod", FolderListing())
     assert [path.name for path in found] == ["o.mod"] * expected
+
+
+def test_a_compensated_module_beside_counts(folder):  # noqa: F811
+    text = other(f"w.uframe:={FRAME};")
+    stamp = stamp_line("0", "m", Source("o.mod", text.encode()), "!").decode()
+    own = module(go("p1")).decode().replace(WOBJ, shared(WOBJ))
+    found = compensated(folder, {"job.mod": own, "o.mod": stamp + text})
+    assert found.exit_code == 1 and "w may be changed by o.mod" in found.stderr
