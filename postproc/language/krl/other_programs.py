@@ -13,6 +13,7 @@ from pathlib import Path
 from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
+from postproc.language.file_name import list_led
 from postproc.language.krl.files import (
     SHARED_LIST,
     USER_SOURCES,
@@ -58,12 +59,20 @@ def find_other_programs(program: Path, listing: FolderListing) -> tuple[Path, ..
     """
     if not program.absolute().parent.is_dir():
         return ()
-    found, own = listing.beside(program, _find_others), program.stem.lower()
-    names = (own, *_list_global(program, *version_of(program)))
-    calling = [one for name in names for one in found.calling.get(name, ())]
+    found = listing.beside(program, _find_others)
+    if not (found.changing or found.calling):
+        return ()
+    led = list_led(KrlFileName(str(program)), listing) if found.calling else [program]
+    own = {path.stem.lower() for path in led}
+    calling = list[Files]()
+    for path in led:
+        for name in (path.stem.lower(), *_list_global(path, *version_of(path))):
+            callers = found.calling.get(name, ())
+            calling += [c for c in callers if c[0].stem.lower() not in own][:CALLERS]
     modal = found.modal if calling else ()
     every = dict.fromkeys((*found.changing, *calling, *modal))
-    others = (files for files in every if files[0].stem.lower() != own)
+    main = program.stem.lower()
+    others = (files for files in every if files[0].stem.lower() != main)
     return tuple(chain.from_iterable(others))
 
 
@@ -84,7 +93,7 @@ def _find_others(folder: Path, listing: FolderListing, but: str) -> OtherProgram
         changing += [own] if IMPORTS in changed or changed & shared else []
         modal += [own] if MODES in changed and len(modal) < CALLERS else []
         for name in called:
-            calling[name] += [own] if len(calling[name]) < CALLERS else []
+            calling[name].append(own)
     return OtherPrograms(changing, calling, modal)
 
 

@@ -9,8 +9,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
-from postproc.files import FolderListing, base_name, find_beside, read_if_readable
+from postproc.files import FolderListing, base_name, read_if_readable
 from postproc.language.analysis.shared_changes import OutsideCall, SharedChange
+from postproc.language.file_name import list_led
 from postproc.language.outputs import HEAD, is_beside_source, version_of
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.program import Program, parse
@@ -53,9 +54,13 @@ def find_other_programs(program: Path, listing: FolderListing) -> tuple[Path, ..
 
     Outputs beside their sources do not count.
     """
-    found, own = listing.beside(program, _find_acting), base_name(program.name)
-    concerned = (one for name in _list_named(program) for one in found.get(name, ()))
-    return tuple(dict.fromkeys(p for p in concerned if base_name(p.name) != own))
+    found = listing.beside(program, _find_acting)
+    if not found:
+        return ()
+    led, own = list_led(Pdl2FileName(str(program)), listing), base_name(program.name)
+    concerned = (p for one in led for p in found.get(base_name(one.name), ()))
+    others = (one for one in concerned if base_name(one.name) != own)
+    return tuple(dict.fromkeys(others))
 
 
 def _find_acting(
@@ -68,20 +73,6 @@ def _find_acting(
             for name in _read_acts(one, *version_of(one)).programs:
                 found[name].append(one)
     return found
-
-
-def _list_named(program: Path) -> list[str]:
-    """List a program, those that it names, and those that these name."""
-    names, waiting = dict[str, None](), [base_name(program.name)]
-    while waiting:
-        name = waiting.pop()
-        if name not in names:
-            names[name] = None
-            path = find_beside(program, f"{name}{Pdl2FileName.programs[0]}")
-            own = read_if_readable(path) if path else b""
-            inside, _ = Pdl2FileName(name).find_named(own, bool, FolderListing())
-            waiting += inside
-    return [*names]
 
 
 @lru_cache(READ_BEFORE)

@@ -83,6 +83,20 @@ def test_a_global_routine_is_called_from_elsewhere_too():
     assert reasons(read(lines, "weld( )", own)) == ["", ""]
 
 
+def test_pages_that_another_folder_calls_begin_anywhere_too(tmp_path):
+    texts = {
+        "System/$config.dat": CONFIG,
+        "Program/m.src": "DEF m( )\npart( )\nEND\n",
+        "Program/part.src": "DEF part( )\nLIN XP1\nEND\n",
+        "Program/sub/o.src": "DEF o( )\npart( )\nEND\n",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    found = find_other_programs(tmp_path / "Program/m.src", FolderListing())
+    assert [path.name for path in found] == ["o.src"]
+
+
 @pytest.mark.parametrize("folder", ["Program", "Program/weld"])
 @pytest.mark.parametrize(
     ("call", "expected"), [("m( )", ["o.src"]), ("weld( )", ["o.src"]), ("x( )", [])]
