@@ -7,16 +7,18 @@ from functools import lru_cache
 from pathlib import Path
 
 from postproc import _native
-from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
 from postproc.language.outputs import is_beside_source, version_of
 from postproc.language.rapid.backup import system_modules
 from postproc.language.rapid.files import RapidFileName
-from postproc.language.rapid.symbols import list_changes, list_names
-from postproc.language.text.source import source_from_bytes
+from postproc.language.rapid.instructions import BY_STRING
+from postproc.language.rapid.symbols import find_words
 
 READ_BEFORE = 8192  # modules of which is known what they change, or declare
 _WORDS = (b"local", b"task", b"var", b"pers", b"const")  # that begin declarations
+_ROUTINE = re.compile(
+    rb"^[ \t]*(?:LOCAL[ \t]+)?(?:PROC|FUNC|TRAP)[ \t]", re.IGNORECASE | re.MULTILINE
+)
 _SHARED = re.compile(
     rb"[ \t]*(?:TASK[ \t]+)?(?:VAR|PERS|CONST)[ \t]+\w+[ \t]+(\w+)", re.IGNORECASE
 )
@@ -48,7 +50,9 @@ def _find_naming(folder: Path, listing: FolderListing, but: str) -> list[Path]:
 @lru_cache(READ_BEFORE)
 def _list_declared(path: Path, changed: int, size: int) -> frozenset[str]:
     """Return the data that a module declares for all, as it is now."""
-    lines = _native.lines_beginning(read_if_readable(path), _WORDS)
+    text = read_if_readable(path)
+    routine = _ROUTINE.search(text)  # data stand before all routines
+    lines = _native.lines_beginning(text[: routine and routine.start()], _WORDS)
     found = filter(None, (_SHARED.match(line) for _, line in lines))
     return frozenset(one[1].decode("latin-1").lower() for one in found)
 
@@ -59,9 +63,6 @@ def _names_any(path: Path, changed: int, size: int, declared: frozenset[str]) ->
 
     One that sets data by their names in texts may mean any.
     """
-    try:
-        source = source_from_bytes(path.name, read_if_readable(path))
-        names, changes = list_names(source), list_changes(source)
-    except ProgramError:
-        return False
-    return not names.isdisjoint(declared) or any(not one.name for one in changes)
+    words = find_words(read_if_readable(path))
+    names = words & declared - _list_declared(path, changed, size)
+    return bool(names) or not words.isdisjoint(BY_STRING)

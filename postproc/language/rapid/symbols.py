@@ -46,7 +46,11 @@ from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 
-_WORD, _UNREAD = re.compile(rb"[a-z]\w*"), re.compile(rb'"[^"\n]*"|![^\n]*')
+_UNREAD = re.compile(rb'"[^"\n]*"|![^\n]*')
+_BLANK = bytes(
+    k if (chr(k).isalnum() and k < 128) or k == 95 else 32 for k in range(256)
+)
+"""Makes blanks of all that words are not made of."""
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
 """Functions whose first argument is a target."""
 
@@ -426,7 +430,11 @@ def list_changes(source: Source) -> tuple[SharedChange, ...]:
 @lru_cache(KEPT_FILES)
 def list_names(source: Source) -> frozenset[str]:
     """List the words of a module that are no names of data which it declares."""
-    words = frozenset(_WORD.findall(_UNREAD.sub(b" ", source.data.lower())))
     file = parse_shared(read_rapid, source)
-    own = {one.name for one in file.data if not one.routine}
-    return frozenset(word.decode("latin-1") for word in words) - own
+    return find_words(source.data) - {one.name for one in file.data if not one.routine}
+
+
+def find_words(text: bytes) -> frozenset[str]:
+    """Find the words of a module, in lower case, but for comments and strings."""
+    words = _UNREAD.sub(b" ", text).translate(_BLANK).lower()
+    return frozenset(words.decode("ascii").split())
