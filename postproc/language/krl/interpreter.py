@@ -23,6 +23,7 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.krl import syntax as said
+from postproc.language.krl.inline_forms import sets_modes, takes_plain
 from postproc.language.krl.modal_state import (
     HALTING,
     HARMLESS,
@@ -133,6 +134,15 @@ class KrlMachine(TaskMachine):
         file = self.task.files[context.place.scope.file]
         alone = self._has_interrupts or file.is_system
         return super().reads_at_once(context) and not alone
+
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True for what inline forms set; some routines do nothing at all."""
+        if isinstance(one, ir.Instruction) and one.name not in self.task.routines:
+            known = package_routines().get(one.name) == AHEAD
+            if known and not self._is_overruled(one.name):
+                return takes_plain(one.arguments)
+        own = "bas" in self.task.routines or self.task.copies_are_points
+        return sets_modes(one) and not own
 
     def list_apart(self, file: int) -> set[int]:
         """Return the points of splines."""

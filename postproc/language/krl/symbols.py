@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
@@ -17,10 +18,16 @@ from postproc.language.analysis.call_graph import reach
 from postproc.language.analysis.conditions import cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.move_blocks import TargetSlots
-from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
+from postproc.language.analysis.symbols import (
+    FreeName,
+    TaskSymbols,
+    holds_odd,
+    whole,
+)
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
+from postproc.language.krl.inline_forms import COPIES, find_alike, sets_alone
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile
 from postproc.language.krl.shared_changes import (
@@ -30,6 +37,7 @@ from postproc.language.krl.shared_changes import (
 )
 from postproc.language.shifts import Pose, Shift, ShiftKind
 from postproc.language.text.symbol_column import read_names
+from postproc.language.text.templates import name_index
 
 CONFIG = "$config"
 ANY: tuple[int, ...] = ()  # an element whose index is not known
@@ -253,7 +261,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             found[name] |= {one.index or ANY for one in self.changed_elsewhere[name]}
         for number, file in enumerate(self.files):
             there = Scope(number, "", "")
-            for row in file.text.of_kind(lambda one: bool(self.list_changes(one))):
+            for row in file.text.of_kind(lambda one: self._may_change(one, arrays)):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in arrays and not given:
@@ -261,6 +269,11 @@ class KrlTask(TaskSymbols[KrlFile]):
                         here = self.scope_of(routine) if routine else there
                         found[target.name].add(self._index_of(target, here.at(row)))
         return found
+
+    def _may_change(self, one: ir.SourceStatement, arrays: Collection[str]) -> bool:
+        """Return True if a statement whose numbered names are open may change some."""
+        names = [target.name for target in self.list_changes(one)]
+        return any(name in arrays or name_index(name) >= 0 for name in names)
 
     def _index_of(self, target: ir.DataObject, here: Scope) -> tuple[int, ...]:
         """Return the index of an element, ANY where it is not known or an element."""
@@ -347,10 +360,26 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
         """Return where a plain move goes, see `TaskSymbols.plain_end`."""
-        if not isinstance(one, said.KrlMove) or one.settings:
+        if not isinstance(one, said.KrlMove):
+            return None
+        if not all(sets_alone(setting, self.routines) for setting in one.settings):
             return None
         plain = one.word in ("ptp", "lin", "sptp", "slin") and one.via is None
         return one.to if plain and one.angle is None else None
+
+    def free_names(self, one: ir.SourceStatement) -> list[FreeName]:
+        """Add data that a move sets something to for itself alone."""
+        found = super().free_names(one)
+        if isinstance(one, said.KrlMove) and self.plain_end(one) is not None:
+            data = ir.data_in(*(setting.value for setting in one.settings))
+            places = (name_index(part.name) for part in data)
+            found += [FreeName(at, read=True) for at in places if at >= 0]
+        return found
+
+    def find_alike(self, file: int) -> Ints:
+        """Find the names of inline forms' data that hold the same."""
+        own = [one for k, one in enumerate(self.files) if self._units[k] == file]
+        return find_alike(self.files[file], own, self.written)
 
     def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
         """Return the numbers of an aggregate, see `TaskSymbols.read_slots`."""
@@ -380,6 +409,12 @@ class KrlTask(TaskSymbols[KrlFile]):
         uses.written |= self.changed_elsewhere.keys()
         uses.read |= self.beside.union(*(part.read for part in self._beside))
         uses.read |= self.words_of_odd()
+
+    @cached_property
+    def copies_are_points(self) -> bool:
+        """Whether a program has points or numbers of the names that forms set."""
+        own = (one for one in self.every_datum if one.name in COPIES)
+        return any(one.type in self.followed for one in own)
 
     @cached_property
     def _points(self) -> frozenset[str]:

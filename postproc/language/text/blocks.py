@@ -19,9 +19,8 @@ from postproc.language.analysis.control_flow import (
     is_structural,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
-from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.statement_table import StatementText
-from postproc.language.text.templates import name_index
+from postproc.language.text.templates import alike, name_index, number_in_order
 from postproc.language.visits import Diagnostic
 
 
@@ -70,23 +69,24 @@ class Outline:
         self._find_declared()
 
     def _find_declared(self) -> None:
-        """Find declarations of one name, the only one in them that has a digit.
+        """Find declarations of one name that has a digit.
 
-        What they say is not built: it is that of their form.
+        What they say is built once for all whose other names are the same.
         """
         text, shapes = self.text, self.text.shapes
-        found = dict[int, Datum]()
-        for form, one in enumerate(text.said.said):
-            if isinstance(one, ir.Declaration) and len(one.items) == 1:
-                alone = shapes.texts[form].count(NAME_MARK) == 1
-                if alone and name_index(one.items[0].name) == 0:
-                    (found[form],) = list_data(one, -1, "", "")
         form_of = text.said.form[text.shape]
-        rows = np.flatnonzero(np.isin(form_of, [*found]))
-        at = shapes.name[shapes.first[text.shape[rows]]].astype(np.int64)
-        own = [found[k] for k in form_of[rows].tolist()]
-        pairs = zip(own, shapes.names.take(at).lower(), strict=True)
-        self._declared = dict(zip(rows.tolist(), pairs, strict=True))
+        for form in np.flatnonzero([*map(_declares_open, text.said.said)]).tolist():
+            rows = np.flatnonzero(form_of == form)
+            names = shapes.names_at(text.shape[rows])
+            ends = (names.shape[1] - 1) * np.arange(1, len(rows) + 1)
+            others = names[:, 1:]
+            kind = alike(others.ravel(), ends - others.shape[1], ends)
+            first = rows[number_in_order(kind)[1]].tolist()
+            data = [one for row in first for one in
+                    list_data(text.statement(row), row, "", "")]  # fmt: skip
+            own = shapes.names.take(names[:, 0].astype(np.int64)).lower()
+            pairs = zip([data[k] for k in kind.tolist()], own, strict=True)
+            self._declared.update(zip(rows.tolist(), pairs, strict=True))
 
     def _begin_blocks(self) -> None:
         self._blocks = FlowReader(self.text.line, tell_open=self._tell_open)
@@ -216,3 +216,9 @@ def check_blocks(file: TaskFile) -> None:
         if found.code == Code.OPEN_BLOCK:
             cure = "Close it: what runs when is not known without"
             raise ProgramError(found.file, found.message, cure, line=found.line)
+
+
+def _declares_open(one: ir.SourceStatement) -> bool:
+    """Return True if a statement declares one name that is open, the first in it."""
+    items = one.items if isinstance(one, ir.Declaration) else ()
+    return len(items) == 1 and name_index(items[0].name) == 0

@@ -258,19 +258,18 @@ class ParsedShapes(Generic[T]):
         """Return the form of every shape, as an index into `said`, (k,)."""
         return self.shapes.form
 
-    def distinct(self, shapes: Ints, free: Callable[[T], int]) -> Ints:
-        """Return one of all shapes that differ in a name alone that says nothing.
+    def distinct(self, shapes: Ints, free: Sequence[Sequence[int]]) -> Ints:
+        """Return one of all shapes that differ in names alone that do not count.
 
         Args:
             shapes: Some shapes, (m,).
-            free: Tells which name of a form says nothing, -1 for none.
+            free: Which names of each form do not count.
         """
-        at = np.array([free(one) for one in self.said], dtype=np.int64)
-        forms = self.form[shapes]
-        kept = [shapes[at[forms] < 0]]
-        for form in np.flatnonzero(np.bincount(forms, minlength=len(at)) * (at >= 0)):
+        forms, some = self.form[shapes], np.array([*map(bool, free)], dtype=bool)
+        kept = [shapes[~some[forms]]]
+        for form in np.unique(forms[some[forms]]).tolist():
             own = shapes[forms == form]
-            names = np.delete(self.shapes.names_at(own), at[form], axis=1)
+            names = np.delete(self.shapes.names_at(own), [*free[form]], axis=1)
             ends = names.shape[1] * np.arange(1, len(own) + 1)
             kind = alike(names.ravel(), ends - names.shape[1], ends)
             kept.append(own[number_in_order(kind)[1]])
