@@ -22,6 +22,7 @@ from postproc.language.analysis.assigned_points import (
     PointPart,
     Points,
     Scope,
+    find_added,
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
@@ -864,8 +865,10 @@ class TaskSymbols(ABC, Generic[F]):
             return mine is not None and mine == theirs
         if (one.copied, one.goal is None) != (other.copied, other.goal is None):
             return False
-        parts = [[(c.name, c.value) for c in p.components] for p in (one, other)]
-        if parts[0] != parts[1] or any(value is None for _, value in parts[0]):
+        parts = [
+            [(c.name, c.value, c.along) for c in p.components] for p in (one, other)
+        ]
+        if parts[0] != parts[1] or any(value is None for _, value, _ in parts[0]):
             return False
         return one.base == other.base and (one.base is None or is_written(one.base))
 
@@ -919,12 +922,22 @@ class TaskSymbols(ABC, Generic[F]):
         if part.index is None:
             return points.forget(part.place)
         there = replace(here, points=points)
-        return points.give(self._give_value(part, part.index, one.value, there))
+        along = bool(find_added(one.target, one.value))
+        return points.give(self._give_value(part, part.index, one.value, there, along))
 
     def _give_value(
         self, part: PointPart, index: tuple[int, ...], value: ir.Operand, here: Scope,
+        along: bool = False,
     ) -> AssignedPoint:  # fmt: skip
-        """Return what a point holds that is given a value, or a component of it."""
+        """Return what a point holds that is given a value, or a component of it.
+
+        Args:
+            part: What is given the value.
+            index: Of the element.
+            value: The value.
+            here: The assignment.
+            along: It adds something to the component.
+        """
         place, own = part.place, frozenset([part.place[-1]])
         known = None if part.component else self.find_held(value, here)
         if known is not None:
@@ -946,7 +959,7 @@ class TaskSymbols(ABC, Generic[F]):
             point = known or self._give_whole(part, index, source, base, plain)
             point = point.copy_to(place, index, own)
         parts = self.list_components(part, found)
-        numbers = [Component(*one, here.file, here.row) for one in parts]
+        numbers = [Component(*one, here.file, here.row, along) for one in parts]
         return point.with_components(numbers, names)
 
     def _give_whole(

@@ -100,6 +100,7 @@ class RapidGoal(goals.GoalReader):
     task: RapidTask
     dialect = RAPID_DIALECT
     brackets = "{}"
+    places = ("trans.x", "trans.y", "trans.z")
     system = "it stands in a system module, which is read and not rewritten"
 
     # Moves.
