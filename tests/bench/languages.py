@@ -208,6 +208,9 @@ NEW_FORM = (
     r"$LOAD=SLOAD(FP\1.TOOL_NO), $ACC=SACC_CP(LCPDAT\1), "
     r"$ORI_TYPE=SORI_TYP(LCPDAT\1), $APO=SAPO(LCPDAT\1), $JERK=SJERK(LCPDAT\1) C_SPL"
 )
+BEGIN = """GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )
+INTERRUPT ON 3
+$TOOL="""
 FORMS = {"KSS 5 to 7": OLD_FORM, "KSS 8": NEW_FORM}
 FORM_DATA = """DECL FDAT FP{0}={{TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE,POINT2[] " "}}
 DECL LDAT LCPDAT{0}={{VEL 2.0,ACC 100.0,APO_DIST 1.0,ORI_TYP #VAR,CIRC_TYP #BASE}}
@@ -225,6 +228,7 @@ def with_forms(named: Mapping[str, bytes], form: str) -> dict[str, bytes]:
     frames = {"TOOL_DATA": tool, "BASE_DATA": base}
     entries = (f"DECL FRAME {k}[2]\r\n{k}[1]={at}" for k, at in frames.items())
     config = ["DEFDAT  $CONFIG", *entries, "ENDDAT", ""]
+    source = source.replace("$TOOL=", BEGIN.replace("\n", "\r\n"), 1)
     files = {"job.src": source.replace("SPTP", "PTP" if "LIN X" in form else "SPTP"),
              "job.dat": data.replace("ENDDAT", f"{own}ENDDAT"),
              "$config.dat": "\r\n".join(config)}  # fmt: skip

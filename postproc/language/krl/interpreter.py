@@ -169,10 +169,16 @@ class KrlMachine(TaskMachine):
 
     @cached_property
     def _has_interrupts(self) -> bool:
-        """Return True if interrupts or triggers may call routines."""
+        """Return True if interrupts or triggers may move the arm, or end its moves."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for file in self.task.files for one in file.text.said.said)
-        return any(isinstance(one, kinds) for one in said_ones)
+        for number, file in enumerate(self.task.files):
+            here = Scope(number, file.name, "")
+            for row in file.text.of_kind(lambda one: isinstance(one, kinds)):
+                one = file.text.statement(row)
+                assert isinstance(one, kinds)
+                if self.effects_of(one.action, here):
+                    return True
+        return False
 
     # What it does.
 

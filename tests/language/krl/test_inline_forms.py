@@ -31,6 +31,8 @@ DECL PDAT PDAT_ACT
 DECL LDAT LDAT_ACT
 ENDDAT
 """
+INI = """GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO {} ( )
+INTERRUPT ON 3"""
 RARE = (
     "WAIT SEC 0", "$APO.CDIS=7", "$APO={CDIS 4,CPTP 20}", "$VEL.CP=0.3", "$ADVANCE=0",
     "$ADVANCE=3", "$TOOL=TOOL_DATA[2]", "BAS(#BASE,1)", "BAS(#TOOL,2)", "BAS(#FRAMES)",
@@ -41,7 +43,8 @@ RARE = (
     "$TOOL={X 0,Y 0,Z 300,A 0,B 0,C 0}", "BAS(#VEL_CP,NUMBER1)", "NUMBER1=2",
     "SLIN X3 WITH $TOOL=STOOL2(F2), $APO=SAPO(LC3) C_SPL",
     "PTP X2 C_PTP", "LIN X1", "LIN X7 C_DIS ; @taught", "PULSE($OUT[1],TRUE,1)",
-    "$TIMER[1]=0", "LIN X8 C_DIS", "ON_ERROR_PROCEED",
+    "$TIMER[1]=0", "LIN X8 C_DIS", "ON_ERROR_PROCEED", "INTERRUPT OFF 3",
+    "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE", "INTERRUPT ON 3",
 )  # fmt: skip
 
 
@@ -54,6 +57,7 @@ def drawn(seed: int) -> dict[str, bytes]:
         "DECL LDAT LOCAL1",
         *["DECL FDAT F2"] * (draw.random() < 0.2),
     ]
+    lines += [INI.format(draw.choice(["IR_STOPM"] * 9 + ["AWAY"]))]
     lines += ["BAS(#INITMOV,0)", "BAS(#TOOL,1)", "BAS(#BASE,1)", "PTP X1"]
     for _ in range(draw.randint(1, 4)):
         inner = [line for _ in range(draw.randint(3, 9)) for line in _form(draw, rare)]
@@ -122,6 +126,17 @@ def test_forms_of_a_pendant_are_read_at_once(form, named, cell, monkeypatch):
     same(files, cell)
     assert sum(folded(files, cell, monkeypatch)) > 50
     assert _known(read_program(files, cell).visits) == 60
+
+
+def test_an_interrupt_that_moves_nothing_leaves_forms_read_at_once(
+    named, cell, monkeypatch
+):
+    files = with_forms(named, FORMS["KSS 5 to 7"])
+    for action, many in (("IR_STOPM", True), ("AWAY", False)):
+        source = files["job.src"].replace(b"IR_STOPM", action.encode())
+        own = {**files, "job.src": source}
+        same(own, cell)
+        assert (sum(folded(own, cell, monkeypatch)) > 50) is many
 
 
 def test_data_that_hold_the_same_are_copied_once(named, cell, monkeypatch):
