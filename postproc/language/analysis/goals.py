@@ -28,6 +28,10 @@ AT_RUN_TIME = Reason(
     Code.RUNTIME_VALUE, "the target is known only when the program runs"
 )
 COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
+_GIVEN = Reason(
+    Code.COMPUTED_TARGET,
+    "the target is an element of an array that its routine is called with",
+)
 _OF_NUMBERS = (None, Code.PARTIAL_TARGET, Code.COMPUTED_TARGET)
 G = TypeVar("G", bound="GoalReader")
 
@@ -241,8 +245,8 @@ class GoalReader(ABC):
         if not (name or goal.slots[0] >= 0):
             return goal
         if goal.slots[0] >= 0 and not self._is_own(goal, operand):
-            goal = replace(goal, slots=(-1,) * len(goal.slots))
-            goal = replace(goal, why=goal.why or COMPUTED)
+            why = _GIVEN if name in self.here.parameters else COMPUTED
+            goal = replace(goal, slots=(-1,) * len(goal.slots), why=goal.why or why)
         return self.name_goal(goal, name, self._spell_steps(operand)) if name else goal
 
     def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
