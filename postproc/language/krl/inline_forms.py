@@ -6,6 +6,7 @@ them before its move. Most forms of a program store the same.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Container, Iterator, Sequence, Set
 from typing import Any
 
@@ -113,10 +114,10 @@ def find_alike(file: TaskFile, unit: Sequence[TaskFile], written: Set[str]) -> I
 
 def _find_double(unit: Sequence[TaskFile]) -> set[str]:
     """Find the names of data that routines have of their own, or that stand twice."""
-    seen, double = set[str](), set[str]()
-    for one in (datum for file in unit for datum in file.data):
-        double.update([one.name] if one.routine or one.name in seen else ())
-        seen.add(one.name)
+    data = [datum for file in unit for datum in file.data]
+    times = Counter([datum.name for datum in data])
+    double = {name for name, many in times.items() if many > 1}
+    double.update(datum.name for datum in data if datum.routine)
     heads = (rows.head for file in unit for rows in file.routines)
     return double.union(one.name for head in heads for one in head.parameters)
 

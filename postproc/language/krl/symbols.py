@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.conditions import cell_pose
+from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import (
@@ -115,8 +115,13 @@ def entry_name(table: str, number: int) -> str:
 
 @dataclass
 class KrlTask(TaskSymbols[KrlFile]):
-    """The files of a job, the source first."""
+    """The files of a job, the source first.
 
+    Attributes:
+        first_frames: Entries of tables as they are at first, by file and row.
+    """
+
+    first_frames: dict[tuple[int, int], TaskFrame] = field(default_factory=dict)
     comments = COMMENTS
     layouts = FIELDS
     followed = (*FIELDS, "int", "real", "bool")
@@ -136,8 +141,10 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def is_exported(self, datum: Datum) -> bool:
         """Return True for GLOBAL data, and those that other programs import."""
+        if not self._imported:
+            return super().is_exported(datum)
         imported = (datum.module, datum.name) in self._imported
-        return super().is_exported(datum) or imported
+        return imported or super().is_exported(datum)
 
     @cached_property
     def _imported(self) -> frozenset[tuple[str, str]]:
@@ -148,10 +155,11 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
         """What other programs change of the data that all share, by name."""
+        changes = [*list_shared_changes(self.files_beside, self.new_uses)]
         data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
-        shared = HELD.union(one.name for k, one in data if self.shares(k, one))
-        found = dict[str, list[SharedChange]]()
-        for one in list_shared_changes(self.files_beside, self.new_uses):
+        known = (one.name for k, one in data if changes and self.shares(k, one))
+        shared, found = HELD.union(known), dict[str, list[SharedChange]]()
+        for one in changes:
             if one.name in shared:
                 found.setdefault(one.name, []).append(one)
         return found
