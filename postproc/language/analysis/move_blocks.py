@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -15,6 +15,7 @@ from postproc.language.analysis.found_goals import FoundGoal, FoundVisit
 from postproc.language.text.statement_table import Statements, StatementText
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import name_index, number_in_order
+from postproc.language.text.templates import split_by as split_by
 
 LEAST = 4  # moves that are worth it
 Runs = dict[int, int]
@@ -379,15 +380,6 @@ class MoveBlock(FoundVisit):
     def members(self) -> Sequence[Ints]:
         """The moves that each example stands for, by their place among these."""
         return [own for _, own in split_by(self.group)]
-
-
-def split_by(values: Ints | Indices) -> Iterator[tuple[int, Ints]]:
-    """Yield each of some values, ascending, and where it stands, (m,)."""
-    order = np.argsort(values, kind="stable")
-    ascending = values[order]
-    cuts = np.flatnonzero(np.diff(ascending)) + 1
-    for own in np.split(order, cuts) if len(order) else ():
-        yield int(values[own[0]]), own
 
 
 def choose_examples(

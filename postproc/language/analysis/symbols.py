@@ -48,7 +48,7 @@ from postproc.language.analysis.values import (
 from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
-from postproc.language.text.templates import name_index
+from postproc.language.text.templates import Shapes, name_index, split_by
 
 DEEPEST = 20  # names that stand for names
 F = TypeVar("F", bound=TaskFile)
@@ -462,16 +462,12 @@ class TaskSymbols(ABC, Generic[F]):
             if routine.key in self.dead:
                 live[routine.inside.start : routine.inside.stop] = False
         shapes = np.unique(text.shape[live])
-        free = [*map(self.free_names, text.said.said)]
+        free = [self.free_names(one) for one in text.said.said]
         apart = [[one.at for one in some] for some in free]
         for k in text.said.distinct(shapes, apart).tolist():
             self.note_in(uses, file, text.said[k])
-        forms = text.said.form[shapes]
-        for form in np.flatnonzero([*map(bool, free)]).tolist():
-            names = text.shapes.names_at(shapes[forms == form])
-            for one in (one for one in free[form] if one.is_noted and len(names)):
-                used = np.unique(names[:, one.at]).astype(np.int64)
-                one.note(uses, text.shapes.names.take(used).lower())
+        for form, at in split_by(text.said.form[shapes]):
+            _note_free(uses, text.shapes, shapes[at], free[form])
 
     @cached_property
     def dead(self) -> frozenset[tuple[int, int]]:
@@ -1061,6 +1057,22 @@ def _find_copied(one: ir.SourceStatement) -> FreeName | None:
         ) if name_index(target) < 0 <= name_index(name):
             return FreeName(name_index(name), target=target)
     return None
+
+
+def _note_free(
+    uses: NamesUsed, shapes: Shapes, own: Ints, free: Sequence[FreeName]
+) -> None:
+    """Note what shapes of one form name where that is noted for all at once.
+
+    Args:
+        uses: What notes it.
+        shapes: The shapes of a file.
+        own: Those of the form, (m,).
+        free: Where.
+    """
+    for one in (name for name in free if name.is_noted):
+        used = np.unique(shapes.names_at(own)[:, one.at]).astype(np.int64)
+        one.note(uses, shapes.names.take(used).lower())
 
 
 def _is_loop(one: ir.SourceStatement) -> bool:

@@ -19,7 +19,7 @@ from postproc.language.analysis.move_blocks import number_rows
 from postproc.language.krl import syntax as said
 from postproc.language.text.statement_table import StatementText
 from postproc.language.text.symbol_column import NameColumn
-from postproc.language.text.templates import name_index, number_in_order
+from postproc.language.text.templates import name_index, number_in_order, split_by
 
 COPIES = {"fdat_act": "fdat", "pdat_act": "pdat", "ldat_act": "ldat"}
 """What the data of inline forms are copied to, by name, and their types."""
@@ -124,9 +124,10 @@ def _find_double(unit: Sequence[TaskFile]) -> set[str]:
 
 def _list_kinds(text: StatementText[Any]) -> Iterator[tuple[NameColumn, Ints]]:
     """Yield names that are declared alike, m, and which hold the same numbers, (m,)."""
-    forms = text.said.form[text.shape]
-    for form in np.flatnonzero([*map(_declares_data, text.said.said)]).tolist():
-        rows = np.flatnonzero(forms == form)
+    declares = np.array([*map(_declares_data, text.said.said)], dtype=bool)
+    found = np.flatnonzero(declares[text.said.form[text.shape]])
+    for _, own in split_by(text.said.form[text.shape[found]]):
+        rows = found[own]
         names = text.shapes.names_at(text.shape[rows])
         begin = text.first[rows]
         count = int(text.first[rows[0] + 1] - begin[0])

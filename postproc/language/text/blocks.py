@@ -20,7 +20,11 @@ from postproc.language.analysis.control_flow import (
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
 from postproc.language.text.statement_table import StatementText
-from postproc.language.text.templates import alike, name_index, number_in_order
+from postproc.language.text.templates import (
+    alike,
+    name_index,
+    number_in_order,
+)
 from postproc.language.visits import Diagnostic
 
 
@@ -74,19 +78,18 @@ class Outline:
         What they say is built once for all whose other names are the same.
         """
         text, shapes = self.text, self.text.shapes
-        form_of = text.said.form[text.shape]
-        for form in np.flatnonzero([*map(_declares_open, text.said.said)]).tolist():
-            rows = np.flatnonzero(form_of == form)
-            names = shapes.names_at(text.shape[rows])
-            ends = (names.shape[1] - 1) * np.arange(1, len(rows) + 1)
-            others = names[:, 1:]
-            kind = alike(others.ravel(), ends - others.shape[1], ends)
-            first = rows[number_in_order(kind)[1]].tolist()
-            data = [one for row in first for one in
-                    list_data(text.statement(row), row, "", "")]  # fmt: skip
-            own = shapes.names.take(names[:, 0].astype(np.int64)).lower()
-            pairs = zip([data[k] for k in kind.tolist()], own, strict=True)
-            self._declared.update(zip(rows.tolist(), pairs, strict=True))
+        opens = np.array([*map(_declares_open, text.said.said)], dtype=bool)
+        rows = np.flatnonzero(opens[text.said.form[text.shape]])
+        first, behind = (shapes.first[text.shape[rows] + k] for k in (0, 1))
+        kind = alike(shapes.name, first + 1, behind)  # names but the declared one
+        kind, example = number_in_order(
+            kind * len(opens) + text.said.form[text.shape[rows]]
+        )
+        data = [one for row in rows[example].tolist()
+                for one in list_data(text.statement(row), row, "", "")]  # fmt: skip
+        names = shapes.names.take(shapes.name[first].astype(np.int64)).lower()
+        pairs = zip([data[k] for k in kind.tolist()], names, strict=True)
+        self._declared = dict(zip(rows.tolist(), pairs, strict=True))
 
     def _begin_blocks(self) -> None:
         self._blocks = FlowReader(self.text.line, tell_open=self._tell_open)

@@ -49,6 +49,15 @@ def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     return _native.number_in_order(np.ascontiguousarray(keys, np.int64), None)
 
 
+def split_by(values: AnyInts) -> Iterator[tuple[int, Ints]]:
+    """Yield each of some values, ascending, and where it stands, (m,)."""
+    order = np.argsort(values, kind="stable")
+    ascending = values[order]
+    cuts = np.flatnonzero(np.diff(ascending)) + 1
+    for own in np.split(order, cuts) if len(order) else ():
+        yield int(values[own[0]]), own
+
+
 # The shapes of the lines of a file: few forms, with many names filled in.
 
 AnyInts = NDArray[np.signedinteger[Any]]
@@ -265,10 +274,10 @@ class ParsedShapes(Generic[T]):
             shapes: Some shapes, (m,).
             free: Which names of each form do not count.
         """
-        forms, some = self.form[shapes], np.array([*map(bool, free)], dtype=bool)
-        kept = [shapes[~some[forms]]]
-        for form in np.unique(forms[some[forms]]).tolist():
-            own = shapes[forms == form]
+        some = np.array([*map(bool, free)], dtype=bool)[self.form[shapes]]
+        kept, shapes = [shapes[~some]], shapes[some]
+        for form, at in split_by(self.form[shapes]):
+            own = shapes[at]
             names = np.delete(self.shapes.names_at(own), [*free[form]], axis=1)
             ends = names.shape[1] * np.arange(1, len(own) + 1)
             kind = alike(names.ravel(), ends - names.shape[1], ends)
