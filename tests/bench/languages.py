@@ -3,7 +3,7 @@
     python -m tests.bench.languages [--targets 20000] [--rounds 3]
     python -m tests.bench.languages --files [--targets 1000000]
     python -m tests.bench.languages --named [--targets 20000]
-    python -m tests.bench.languages --forms [--targets 20000]
+    python -m tests.bench.languages --inline-forms [--targets 20000]
 
 The same moves in the same cell, one process, without cycle times. Languages take
 turns; the fastest round of each counts.
@@ -11,8 +11,8 @@ turns; the fastest round of each counts.
 `--named`: the time to read them where every target is a point of its own name, declared
 in the module (RAPID), in the data list (KRL) or in the variable file (PDL2).
 
-`--forms`: the time to read them in KRL where every target is an inline form, as the
-pendant writes them, with a point and data of its own.
+`--inline-forms`: the time to read them in KRL where every target is an inline form, as
+the pendant writes them, with a point and data of its own.
 
 `--files`: from files to written output and reports, by as many processes as there are
 cores. The moves are one fly run; those of 20,000 targets are repeated.
@@ -322,9 +322,9 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--files", action="store_true")
     parser.add_argument("--named", action="store_true")
-    parser.add_argument("--forms", action="store_true")
+    parser.add_argument("--inline-forms", action="store_true")
     asked = parser.parse_args()
-    if asked.forms:
+    if asked.inline_forms:
         print("\n".join(read_forms(asked.targets, asked.rounds)))
         return
     if asked.named:
