@@ -24,6 +24,7 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.krl import syntax as said
+from postproc.language.krl.inline_forms import sets_modes, takes_plain
 from postproc.language.krl.modal_state import (
     HALTING,
     HARMLESS,
@@ -153,6 +154,15 @@ class KrlMachine(TaskMachine):
         alone = self._has_interrupts or file.is_system
         return super().reads_at_once(context) and not alone
 
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True for what inline forms set; some routines do nothing at all."""
+        if isinstance(one, ir.Instruction) and one.name not in self.task.routines:
+            known = package_routines().get(one.name) == AHEAD
+            if known and not self._is_overruled(one.name):
+                return takes_plain(one.arguments)
+        own = "bas" in self.task.routines or self.task.copies_are_points
+        return sets_modes(one) and not own
+
     def list_apart(self, file: int) -> set[int]:
         """Return the points of splines."""
         return {row for rows in self.task.files[file].splines for row in rows}
@@ -178,10 +188,16 @@ class KrlMachine(TaskMachine):
 
     @cached_property
     def _has_interrupts(self) -> bool:
-        """Return True if interrupts or triggers may call routines."""
+        """Return True if interrupts or triggers may move the arm, or end its moves."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for file in self.task.files for one in file.text.said.said)
-        return any(isinstance(one, kinds) for one in said_ones)
+        for number, file in enumerate(self.task.files):
+            here = Scope(number, file.name, "")
+            for row in file.text.of_kind(lambda one: isinstance(one, kinds)):
+                one = file.text.statement(row)
+                assert isinstance(one, kinds)
+                if self.effects_of(one.action, here):
+                    return True
+        return False
 
     # What it does.
 

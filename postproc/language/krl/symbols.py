@@ -5,18 +5,19 @@ from __future__ import annotations
 import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.conditions import cell_pose
+from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.shared_changes import (
@@ -27,16 +28,23 @@ from postproc.language.analysis.shared_changes import (
     list_outside_calls,
     list_shared_changes,
 )
-from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
+from postproc.language.analysis.symbols import (
+    FreeName,
+    TaskSymbols,
+    holds_odd,
+    whole,
+)
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.imports import list_imports
+from postproc.language.krl.inline_forms import COPIES, find_alike, sets_alone
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.shifts import Pose, Shift, ShiftKind
 from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 from postproc.language.text.symbol_column import read_names
+from postproc.language.text.templates import name_index
 
 CONFIG = "$config"
 ANY: tuple[int, ...] = ()  # an element whose index is not known
@@ -116,8 +124,13 @@ def entry_name(table: str, number: int) -> str:
 
 @dataclass
 class KrlTask(TaskSymbols[KrlFile]):
-    """The files of a job, the source first."""
+    """The files of a job, the source first.
 
+    Attributes:
+        first_frames: Entries of tables as they are at first, by file and row.
+    """
+
+    first_frames: dict[tuple[int, int], TaskFrame] = field(default_factory=dict)
     comments = COMMENTS
     layouts = FIELDS
     followed = (*FIELDS, "int", "real", "bool")
@@ -138,8 +151,10 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def is_exported(self, datum: Datum) -> bool:
         """Return True for GLOBAL data, and those that other programs import."""
+        if not self._imported:
+            return super().is_exported(datum)
         imported = (datum.module, datum.name) in self._imported
-        return super().is_exported(datum) or imported
+        return imported or super().is_exported(datum)
 
     @cached_property
     def _imported(self) -> frozenset[tuple[str, str]]:
@@ -150,9 +165,11 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
         """What other programs change of the data that all share, by name."""
+        own = (list_changes(*sources) for sources in self._others)
+        changes = [*chain.from_iterable(own)]
         data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
-        shared = HELD.union(one.name for k, one in data if self.shares(k, one))
-        changes = chain.from_iterable(list_changes(*own) for own in self._others)
+        known = (one.name for k, one in data if changes and self.shares(k, one))
+        shared = HELD.union(known)
         return collect_changes(changes, shared, self.start)
 
     @cached_property
@@ -299,7 +316,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             found[name] |= {one.index or ANY for one in self.changed_elsewhere[name]}
         for number, file in enumerate(self.files):
             there = Scope(number, "", "")
-            for row in file.text.of_kind(lambda one: bool(self.list_changes(one))):
+            for row in file.text.of_kind(lambda one: self._may_change(one, arrays)):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in arrays and not given:
@@ -307,6 +324,11 @@ class KrlTask(TaskSymbols[KrlFile]):
                         here = self.scope_of(routine) if routine else there
                         found[target.name].add(self.index_of(target, here.at(row)))
         return found
+
+    def _may_change(self, one: ir.SourceStatement, arrays: Collection[str]) -> bool:
+        """Return True if a statement whose numbered names are open may change some."""
+        names = [target.name for target in self.list_changes(one)]
+        return any(name in arrays or name_index(name) >= 0 for name in names)
 
     def initial_switch(self, name: str) -> bool | None:
         """Return a switch that the program has not set so far, None if not known.
@@ -386,10 +408,26 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
         """Return where a plain move goes, see `TaskSymbols.plain_end`."""
-        if not isinstance(one, said.KrlMove) or one.settings:
+        if not isinstance(one, said.KrlMove):
+            return None
+        if not all(sets_alone(setting, self.routines) for setting in one.settings):
             return None
         plain = one.word in ("ptp", "lin", "sptp", "slin") and one.via is None
         return one.to if plain and one.angle is None else None
+
+    def free_names(self, one: ir.SourceStatement) -> list[FreeName]:
+        """Add data that a move sets something to for itself alone."""
+        found = super().free_names(one)
+        if isinstance(one, said.KrlMove) and self.plain_end(one) is not None:
+            data = ir.data_in(*(setting.value for setting in one.settings))
+            places = (name_index(part.name) for part in data)
+            found += [FreeName(at, read=True) for at in places if at >= 0]
+        return found
+
+    def find_alike(self, file: int) -> Ints:
+        """Find the names of inline forms' data that hold the same."""
+        own = [one for k, one in enumerate(self.files) if self._units[k] == file]
+        return find_alike(self.files[file], own, self.written)
 
     def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
         """Return the numbers of an aggregate, see `TaskSymbols.read_slots`."""
@@ -419,6 +457,12 @@ class KrlTask(TaskSymbols[KrlFile]):
         uses.written |= self.changed_elsewhere.keys()
         uses.read |= self.beside.union(*(part.read for part in self._beside))
         uses.read |= self.words_of_odd()
+
+    @cached_property
+    def copies_are_points(self) -> bool:
+        """Whether a program has points or numbers of the names that forms set."""
+        own = (one for one in self.every_datum if one.name in COPIES)
+        return any(one.type in self.followed for one in own)
 
     @cached_property
     def _points(self) -> frozenset[str]:

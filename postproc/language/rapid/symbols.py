@@ -303,7 +303,21 @@ class RapidTask(TaskSymbols[RapidFile]):
         pairs = {name for name in self.declared if f"o_{name}" in self.declared}
         return frozenset(pairs | {f"o_{name}" for name in pairs})
 
-    # Offs and RelTool.
+    # Positions that are added, Offs and RelTool.
+
+    def operate(self, operator: str, parts: Sequence[Value | None]) -> Value | None:
+        """Add and subtract positions, too."""
+        if operator not in ("+", "-") or len(parts) != 2:
+            return super().operate(operator, parts)
+        both = [part for part in parts if isinstance(part, tuple)]
+        if len(both) < 2 or any(len(part) != 3 for part in both):
+            return super().operate(operator, parts)
+        found = [
+            super(RapidTask, self).operate(operator, two)
+            for two in zip(*both, strict=True)
+        ]
+        known = tuple(one for one in found if one is not None)
+        return known if len(known) == 3 else None
 
     def apply(self, call: ir.FunctionCall, here: Scope, depth: int) -> Value | None:
         """Evaluate Offs and RelTool, too."""
