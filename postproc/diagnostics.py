@@ -85,6 +85,13 @@ class Code(StrEnum):
         "The file holds no BEGIN .. END: there is nothing to follow.",
         "Give the file that holds the program.",
     )
+    CALLED_BY_OTHERS = (
+        "called-by-others",
+        WARNING,
+        "Another program calls this one, or a routine in it: place, frames and load at "
+        "its beginning are not known.",
+        "Set the frames in it, behind a move by joint angles.",
+    )
     NO_MAIN = (
         "no-main",
         WARNING,

@@ -121,7 +121,7 @@ class Journal:
 
 # What came of a run: the table, the lists, the exit code.
 
-NEVER_REACHED = "moves that are never reached"
+LEFT_OTHERWISE = "moves or calls that are not followed, see its findings"
 LISTED = 20  # programs that are listed on the terminal; the log lists all
 
 ROWS = {
@@ -200,7 +200,7 @@ class Summary:
     def lists(self) -> list[str]:
         """Return which programs are absent, have uncorrected targets, were removed."""
         left = (
-            (place, f"{n} visits" if n else NEVER_REACHED) for place, n in self.left
+            (place, f"{n} visits" if n else LEFT_OTHERWISE) for place, n in self.left
         )
         return [
             *_some("absent", (f"{place}: {why}" for place, why in self.problems)),

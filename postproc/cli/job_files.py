@@ -9,7 +9,6 @@ from pathlib import Path
 from postproc.cli.common import write_stdout
 from postproc.cli.reports import NO_REPORTS, Reports
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.pages import OUTPUT
 from postproc.compensation.program_files import ProgramFiles
 from postproc.exceptions import OutputError
 from postproc.files import (
@@ -20,6 +19,7 @@ from postproc.files import (
     write_all,
 )
 from postproc.language.languages import file_named
+from postproc.language.outputs import OUTPUT
 from postproc.report.json import report_pieces
 
 

@@ -63,7 +63,7 @@ from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
-from postproc.language.languages import UNNAMED, language_of
+from postproc.language.languages import UNNAMED, file_named, language_of
 from postproc.language.text.source import Source
 from postproc.language.text.stamp import is_stamped
 from postproc.language.visits import Diagnostic, Visits, deduplicate
@@ -164,7 +164,8 @@ def check_preconditions(files: Mapping[str, bytes], cell: Cell, model: Model) ->
         CellError: The controller's absolute accuracy is on, or nothing is said of it.
         ModelError: The model was made for another arm.
     """
-    for name, data in files.items():
+    own = {name: files[name] for name in files if not file_named(name).is_apart}
+    for name, data in own.items():
         if is_stamped(Source(name, data)):
             raise ProgramError(
                 name,

@@ -6,16 +6,14 @@ programs share belongs to none of them, and is taken by itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 
 from postproc.compensation.output.sidecar import sidecar_path
 from postproc.files import FolderListing, read_if_readable
 from postproc.language.languages import file_named
+from postproc.language.outputs import HEAD, OUTPUT
 from postproc.language.text.stamp import read_stamp
-
-HEAD = 1 << 14  # bytes: the stamp of an output stands near its first line
-OUTPUT = ".compensated"  # ends the name of an output, before its suffix
 
 
 def program_arm(path: Path) -> int:
@@ -79,43 +77,76 @@ def group_pages(named: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]
         Main programs and their pages, in the order in which they are named, pages of
         pages behind the page that names them.
 
+    A page belongs to the only program that leads to it, itself or by its other pages.
+
     >>> group_pages({"a": ["p", "q"], "p": [], "q": ["lib"], "b": ["lib"], "lib": []})
     {'a': ('p', 'q'), 'b': (), 'lib': ()}
+    >>> group_pages({"a": ["p", "q"], "p": ["q"], "q": []})
+    {'a': ('p', 'q')}
     """
     users: dict[str, list[str]] = {name: [] for name in named}
     for name, others in named.items():
         for other in others:
             if other in users and other != name:
                 users[other].append(name)
-    owner = {name: by[0] for name, by in users.items() if len(by) == 1}
-    mains = [name for name in named if name not in owner]
-    mains += _in_circles(named, owner)
-    return {main: tuple(_pages(main, named, owner)) for main in mains}
+    mains = [name for name, by in users.items() if not by]
+    led = _lead(mains, users)
+    mains += _list_circles(named, led)
+    while joins := _list_joins(led := _lead(mains, users), users):
+        mains += joins
+    main_of = {name: min(leading) for name, leading in led.items()}
+    ordered = (name for name in named if main_of[name] == name)
+    return {main: tuple(_pages(main, named, main_of)) for main in ordered}
 
 
-def _in_circles(named: Mapping[str, Sequence[str]], owner: dict[str, str]) -> list[str]:
-    """Free programs that name each other in a circle from their owners."""
-    freed = []
-    for name in named:
-        seen, at = {name}, owner.get(name)
-        while at is not None and at not in seen:
-            seen.add(at)
-            at = owner.get(at)
-        if at == name:
-            del owner[name]
-            freed.append(name)
-    return freed
+def _lead(
+    mains: Sequence[str], users: Mapping[str, Sequence[str]]
+) -> dict[str, frozenset[str]]:
+    """Say which main programs lead to each one; what none leads to stays out."""
+    led = {main: frozenset([main]) for main in mains}
+    before = None
+    while led != before:
+        before = dict(led)
+        for name, by in users.items():
+            if name not in mains:
+                found = frozenset[str]().union(*(led.get(user, ()) for user in by))
+                led |= {name: found} if found else {}
+    return led
+
+
+def _list_joins(
+    led: Mapping[str, frozenset[str]], users: Mapping[str, Sequence[str]]
+) -> list[str]:
+    """List programs at which the ways from several main programs meet."""
+    many = [name for name, mains in led.items() if len(mains) > 1]
+    ways = {name: {led.get(user) for user in users[name]} - {None} for name in many}
+    return [name for name in many if len(ways[name]) > 1]
+
+
+def _list_circles(named: Mapping[str, Sequence[str]], led: Container[str]) -> list[str]:
+    """List programs that name each other in a circle, and that no others lead to."""
+    found = []
+    for name in (one for one in named if one not in led):
+        seen, waiting = set[str](), [one for one in named[name] if one != name]
+        while waiting:
+            at = waiting.pop()
+            if at not in seen and at in named:
+                seen.add(at)
+                waiting += named[at]
+        found += [name] if name in seen else []
+    return found
 
 
 def _pages(
-    main: str, named: Mapping[str, Sequence[str]], owner: Mapping[str, str]
+    main: str, named: Mapping[str, Sequence[str]], main_of: Mapping[str, str]
 ) -> list[str]:
-    """List the pages of a program, and behind each its own."""
-    found, waiting = [], [p for p in reversed(named[main]) if owner.get(p) == main]
+    """List the pages of a program, and behind each those that it names first."""
+    found: list[str] = []
+    waiting = [p for p in reversed(named[main]) if main_of.get(p) == main]
     while waiting:
         page = waiting.pop()
-        if page in found:
+        if page in found or page == main:
             continue
         found.append(page)
-        waiting += [p for p in reversed(named[page]) if owner.get(p) == page]
+        waiting += [p for p in reversed(named[page]) if main_of.get(p) == main]
     return found

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import ClassVar
 
-from postproc.files import FolderListing, base_name, find_beside
+from postproc.files import FolderListing, base_name, find_beside, read_if_readable
 
 Named = dict[str, int]  # names of programs, and the lines that name them first
 Skip = Callable[[Path], bool]  # files that belong to no program
@@ -172,3 +172,25 @@ class FileName:
         A job may read such a one for what it does to shared data.
         """
         return False
+
+
+def list_led(program: FileName, listing: FolderListing) -> list[Path]:
+    """List a program, those of its folder that it names, and those that these name.
+
+    Args:
+        program: A file, by its path.
+        listing: What its folder holds.
+    """
+    folder = Path(program.place).absolute().parent
+    found, waiting = dict[Path, None](), [Path(program.place).absolute()]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found[path] = None
+            named, _ = type(program)(str(path)).find_named(
+                read_if_readable(path), lambda _: False, listing
+            )
+            names = (k if k.endswith(program.programs) else k + program.programs[0]
+                     for k in named)  # fmt: skip
+            waiting += filter(None, (listing.named(folder, k) for k in names))
+    return [*found]

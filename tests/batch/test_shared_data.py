@@ -11,6 +11,8 @@ from postproc.batch.tree import scan
 from postproc.compensation.options import Options
 from postproc.files import FolderListing
 from postproc.language.languages import language_of
+from postproc.language.text.source import Source
+from postproc.language.text.stamp import stamp_line
 from tests.golden.case import HERE
 
 KRL = {
@@ -70,4 +72,28 @@ def test_what_programs_share_is_looked_for_once_a_folder(tmp_path, monkeypatch, 
     opened.clear()
     for unit in found.units:
         language_of(unit.program).reads(tmp_path / unit.program, listing)
-    assert not opened
+    assert len(opened) <= len(found.units)  # but for each program itself
+
+
+@pytest.mark.parametrize("files", [KRL, RAPID, PDL2])
+def test_outputs_count_unless_their_sources_stand_beside_them(tmp_path, files):
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    changing, changed = (next(n for n in files if n.split("/")[-1][:2] == w)
+                         for w in ("a.", "b."))  # fmt: skip
+    path, source = tmp_path / changing, (tmp_path / changing).read_bytes()
+    stamp = stamp_line("0", "m", Source(path.name, source), comment_of(path))
+    path.write_bytes(stamp + source)
+
+    def reads():
+        found = language_of(changed).reads(tmp_path / changed, FolderListing())
+        return path in found
+
+    assert reads()
+    path.with_stem("old").write_bytes(source)
+    assert not reads()
+
+
+def comment_of(path):
+    return language_of(path.name).comment

@@ -3,12 +3,16 @@
     python -m tests.bench.languages [--targets 20000] [--rounds 3]
     python -m tests.bench.languages --files [--targets 1000000]
     python -m tests.bench.languages --named [--targets 20000]
+    python -m tests.bench.languages --inline-forms [--targets 20000]
 
 The same moves in the same cell, one process, without cycle times. Languages take
 turns; the fastest round of each counts.
 
 `--named`: the time to read them where every target is a point of its own name, declared
 in the module (RAPID), in the data list (KRL) or in the variable file (PDL2).
+
+`--inline-forms`: the time to read them in KRL where every target is an inline form, as
+the pendant writes them, with a point and data of its own.
 
 `--files`: from files to written output and reports, by as many processes as there are
 cores. The moves are one fly run; those of 20,000 targets are repeated.
@@ -190,6 +194,60 @@ def _seconds_to_read(files: Mapping[str, bytes], cell: Cell, rounds: int) -> flo
     return float(best)
 
 
+# The same job as a KRL pendant writes it.
+
+OLD_FORM = r"""$BWDSTART=FALSE
+LDAT_ACT=LCPDAT\1
+FDAT_ACT=FP\1
+BAS(#CP_PARAMS,0.2)
+SET_CD_PARAMS (0)
+LIN XP\1 C_DIS C_DIS"""
+NEW_FORM = (
+    r"SLIN XP\1 WITH $VEL=SVEL_CP(0.2, , LCPDAT\1), $TOOL=STOOL2(FP\1), "
+    r"$BASE=SBASE(FP\1.BASE_NO), $IPO_MODE=SIPO_MODE(FP\1.IPO_FRAME), "
+    r"$LOAD=SLOAD(FP\1.TOOL_NO), $ACC=SACC_CP(LCPDAT\1), "
+    r"$ORI_TYPE=SORI_TYP(LCPDAT\1), $APO=SAPO(LCPDAT\1), $JERK=SJERK(LCPDAT\1) C_SPL"
+)
+BEGIN = """GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM ( )
+INTERRUPT ON 3
+$TOOL="""
+FORMS = {"KSS 5 to 7": OLD_FORM, "KSS 8": NEW_FORM}
+FORM_DATA = """DECL FDAT FP{0}={{TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE,POINT2[] " "}}
+DECL LDAT LCPDAT{0}={{VEL 2.0,ACC 100.0,APO_DIST 1.0,ORI_TYP #VAR,CIRC_TYP #BASE}}
+"""
+
+
+def with_forms(named: Mapping[str, bytes], form: str) -> dict[str, bytes]:
+    """Write the named lines of a KRL job as inline forms."""
+    source, data = (named[name].decode() for name in ("job.src", "job.dat"))
+    said = [re.search(rf"\${word}=(.*?)\r?\n", source) for word in ("TOOL", "BASE")]
+    tool, base = (one[1] for one in said if one)
+    fold = rf";FOLD LIN P\1 CONT Vel=0.2 m/s CPDAT\1 Tool[1] Base[1]\n{form}\n;ENDFOLD"
+    source, count = re.subn(r"SLIN XP(\d+) C_SPL", fold.replace("\n", "\r\n"), source)
+    own = "".join(FORM_DATA.format(k) for k in range(count)).replace("\n", "\r\n")
+    frames = {"TOOL_DATA": tool, "BASE_DATA": base}
+    entries = (f"DECL FRAME {k}[2]\r\n{k}[1]={at}" for k, at in frames.items())
+    config = ["DEFDAT  $CONFIG", *entries, "ENDDAT", ""]
+    source = source.replace("$TOOL=", BEGIN.replace("\n", "\r\n"), 1)
+    files = {"job.src": source.replace("SPTP", "PTP" if "LIN X" in form else "SPTP"),
+             "job.dat": data.replace("ENDDAT", f"{own}ENDDAT"),
+             "$config.dat": "\r\n".join(config)}  # fmt: skip
+    return {name: text.encode() for name, text in files.items()}
+
+
+def read_forms(targets: int = 20_000, rounds: int = 3) -> list[str]:
+    """Read one job of KRL as named points and as inline forms; write the table."""
+    with TemporaryDirectory() as folder:
+        cell, _ = fitted(ARM, Path(folder))
+    named = with_names(written(milled(cell, targets)))["job.src"]
+    jobs = {"named": named} | {k: with_forms(named, form) for k, form in FORMS.items()}
+    rows = ["| KRL | us a target |", "|---|---|"]
+    for name, files in jobs.items():
+        seconds = _seconds_to_read(files, cell, rounds)
+        rows.append(f"| {name} | {1e6 * seconds / targets:.1f} |")
+    return rows
+
+
 FLY = re.compile(rb"^ *(MOVEFLY LINEAR TO POS|MoveL|SLIN) ?[({\[].*$", re.M)
 
 
@@ -264,7 +322,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--files", action="store_true")
     parser.add_argument("--named", action="store_true")
+    parser.add_argument("--inline-forms", action="store_true")
     asked = parser.parse_args()
+    if asked.inline_forms:
+        print("\n".join(read_forms(asked.targets, asked.rounds)))
+        return
     if asked.named:
         print("\n".join(read_named(asked.targets, asked.rounds)))
         return

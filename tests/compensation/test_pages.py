@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from postproc.compensation.output.sidecar import sidecar_path
-from postproc.compensation.pages import names_in
+from postproc.compensation.pages import group_pages, names_in
 from postproc.compensation.program_files import find_pages
 from postproc.files import FolderListing
 from postproc.language.text.source import Source
@@ -97,3 +97,25 @@ def test_points_that_several_programs_go_to_belong_to_none(tmp_path):
     ):  # fmt: skip
         (tmp_path / name).write_bytes(text)
     assert find_pages(tmp_path / "job.src").paths == ()
+
+
+@pytest.mark.parametrize(
+    ("named", "expected"),
+    [
+        ("a>p a>r p>r", "a>p,r"),
+        ("a>p p>q p>r q>r", "a>p,q,r"),
+        ("a>p b>p p>q", "a> b> p>q"),
+        ("a>u a>v b>u b>v u>p v>p p>q", "a> b> p>q u> v>"),
+        ("a>p b>q p>r q>r r>s r>t s>t", "a>p b>q r>s,t"),
+        ("a>b b>a", "a> b>"),
+        ("a>b b>c c>b", "a>b,c"),
+        ("a>a a>p", "a>p"),
+    ],
+)
+def test_a_page_belongs_to_the_only_program_that_leads_to_it(named, expected):
+    pairs = [pair.split(">") for pair in named.split()]
+    graph = {name: [] for name in sorted({name for pair in pairs for name in pair})}
+    for user, page in pairs:
+        graph[user].append(page)
+    found = group_pages(graph)
+    assert " ".join(f"{k}>{','.join(v)}" for k, v in sorted(found.items())) == expected

@@ -344,7 +344,7 @@ def test_a_call_that_is_not_followed_changes_no_data_of_a_routine(
 
 ALONE = {
     "rapid": ("LOCAL PROC own()\nv:=Offs(p2,0,0,5);\nk:=v.trans.x;\nENDPROC", "LOCAL "),
-    "krl": ("GLOBAL DEF own( )\nDECL E6POS w\nw=p2\nw.X=w.X+5\nEND", "GLOBAL "),
+    "krl": ("GLOBAL DEF own( )\nDECL E6POS w\nw=p2\nw.X=w.X+w.Y\nEND", "GLOBAL "),
     "pdl2": ("ROUTINE own EXPORTED FROM job\nBEGIN\n  v := p2\n  v.X := v.X + 5\n"
              "END own\n", " EXPORTED FROM job"),
 }  # fmt: skip

@@ -25,12 +25,14 @@ class Component:
         name: As it is spelt behind the point: ``trans.z``, ``x``.
         value: Its number [mm, deg], None where only the run tells it.
         file, row: The statement that sets it.
+        along: It is what the point is given there, and a number that is added.
     """
 
     name: str
     value: float | None
     file: int
     row: int
+    along: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,13 @@ class AssignedPoint:
         """Return it with other components.
 
         Args:
-            found: What is set.
+            found: What is set; something is added to those that go along.
             names: Of data that their values depend on.
         """
-        known = {one.name: one for one in (*self.components, *found)}
+        known = {one.name: one for one in self.components}
+        for one in found:
+            before = known.get(one.name, one)
+            known[one.name] = replace(one, along=one.along and before.along)
         components = tuple(known[name] for name in sorted(known))
         return replace(self, components=components, names=self.names | names)
 
@@ -217,3 +222,23 @@ def source_of(operand: ir.Operand | None) -> ir.DataObject | None:
 def is_point(data: ir.DataObject) -> bool:
     """Return True if data are named whole, or an element of them is."""
     return all(isinstance(step, ir.ElementStep) for step in data.steps)
+
+
+def find_added(target: ir.DataObject, value: ir.Operand) -> list[ir.Operand]:
+    """Return what is added to a component of data, or subtracted; none for all else.
+
+    >>> z = ir.DataObject("p", ("z",))
+    >>> find_added(z, ir.Operation("+", (z, ir.Num(0))))
+    [Num(slot=0)]
+    >>> find_added(z, ir.Operation("-", (ir.Num(0), z)))
+    []
+    """
+    added, rest = list[ir.Operand](), value
+    while isinstance(rest, ir.Operation) and rest.operator in ("+", "-"):
+        first, *other = rest.operands
+        if rest.operator == "+" and other == [target]:
+            first, other = target, [first]
+        added += other
+        rest = first if other else ir.Operand()
+    alone = all(data.name != target.name for data in ir.data_in(*added))
+    return added if rest == target and alone and not is_point(target) else []

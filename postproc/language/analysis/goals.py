@@ -19,7 +19,7 @@ from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.symbols import TaskSymbols
 from postproc.language.analysis.values import Value, WrittenNumber
 from postproc.language.pose_encoding import Dialect
-from postproc.language.shifts import Shift
+from postproc.language.shifts import NUMBERS, Shift, ShiftKind
 from postproc.language.visits import Meaning
 
 MOST_NAMED, MOST_PARTS = 3, 6  # lines or data, components, in a reason
@@ -28,6 +28,10 @@ AT_RUN_TIME = Reason(
     Code.RUNTIME_VALUE, "the target is known only when the program runs"
 )
 COMPUTED = Reason(Code.COMPUTED_TARGET, "the target is computed from other data")
+_GIVEN = Reason(
+    Code.COMPUTED_TARGET,
+    "the target is an element of an array that its routine is called with",
+)
 _OF_NUMBERS = (None, Code.PARTIAL_TARGET, Code.COMPUTED_TARGET)
 G = TypeVar("G", bound="GoalReader")
 
@@ -61,6 +65,7 @@ class GoalReader(ABC):
         here: Where the move stands.
         dialect: What numbers of targets mean.
         brackets: Around the index of an element.
+        places: Components of a place, as they are spelt behind a point.
         shout: Names are upper case in messages.
         system: Why numbers of files that are not rewritten must stay.
         outlives: Why those stay that data of no routine are given, "" if they need not.
@@ -72,6 +77,7 @@ class GoalReader(ABC):
     here: Scope
     dialect: ClassVar[Dialect]
     brackets: ClassVar[str]
+    places: ClassVar[Sequence[str]]
     shout: ClassVar[bool] = False
     system: ClassVar[str]
     outlives: ClassVar[str] = ""
@@ -239,8 +245,8 @@ class GoalReader(ABC):
         if not (name or goal.slots[0] >= 0):
             return goal
         if goal.slots[0] >= 0 and not self._is_own(goal, operand):
-            goal = replace(goal, slots=(-1,) * len(goal.slots))
-            goal = replace(goal, why=goal.why or COMPUTED)
+            why = _GIVEN if name in self.here.parameters else COMPUTED
+            goal = replace(goal, slots=(-1,) * len(goal.slots), why=goal.why or why)
         return self.name_goal(goal, name, self._spell_steps(operand)) if name else goal
 
     def name_goal(self, goal: FoundGoal, name: str, steps: str = "") -> FoundGoal:
@@ -321,6 +327,8 @@ class GoalReader(ABC):
         self, held: AssignedPoint, base: FoundGoal, name: str, pins: str
     ) -> FoundGoal:
         """Read a point of which components have been set by themselves."""
+        if (by := self._read_added(held, base)) is not None:
+            return self.apply_shift(replace(base, name=name, pins=pins), by)
         value = self.task.evaluate_held(held)
         found = self.read_value(value) or self.unknown(AT_RUN_TIME)
         partial = found.why.code is Code.PARTIAL_TARGET
@@ -335,6 +343,20 @@ class GoalReader(ABC):
         return hold_numbers(
             base, name, why, pins, found.target, found.values, found.aux
         )
+
+    def _read_added(self, held: AssignedPoint, base: FoundGoal) -> ReadShift | None:
+        """Read what is added to the place of a point, None where more is set."""
+        numbers = [0.0] * NUMBERS
+        for one in held.components:
+            if one.name not in self.places or not one.along or one.value is None:
+                return None
+            at = self.places.index(one.name)
+            numbers[at] = one.value - base.values[at]
+        if base.target != Meaning.POSE:
+            return None
+        kept = {base.writes[0]} if base.is_rewritten_by_shift else set[int]()
+        shift = Shift(ShiftKind.AXES, tuple(numbers), base.values)
+        return ReadShift(shift, own=frozenset(kept))
 
     def _explain_components(
         self, held: AssignedPoint, name: str, known: bool

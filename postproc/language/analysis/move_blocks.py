@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -15,8 +15,9 @@ from postproc.language.analysis.found_goals import FoundGoal, FoundVisit
 from postproc.language.text.statement_table import Statements, StatementText
 from postproc.language.text.symbol_column import NameColumn
 from postproc.language.text.templates import name_index, number_in_order
+from postproc.language.text.templates import split_by as split_by
 
-LEAST = 4  # statements that are worth it
+LEAST = 4  # moves that are worth it
 Runs = dict[int, int]
 """From the first row of a block to the row behind its last."""
 
@@ -103,7 +104,10 @@ class PlainMove:
 
     @property
     def moves(self) -> bool:
-        """Whether they go anywhere; what does nothing at all stands between them."""
+        """Whether they go anywhere; others stand between moves.
+
+        Those do nothing at all, or set what the moves behind them are made with.
+        """
         return bool(self.name or self.target)
 
 
@@ -148,6 +152,7 @@ def find_plain(
     read: Callable[[Any], PlainMove | None],
     are_sound: SoundTest,
     apart: Collection[int] = (),
+    alike: Ints | None = None,
 ) -> PlainMoves:
     """Find the moves of a file that do nothing but go somewhere.
 
@@ -156,6 +161,8 @@ def find_plain(
         read: Reads a statement whose numbered names are open.
         are_sound: Tells which numbers of a target are those of one.
         apart: Rows of statements that are read by themselves.
+        alike: Which name stands for each of the text: those of data that hold the same
+            tell no moves apart that do not go there; None where all do.
     """
     moves = list[PlainMove]()
     variant, name = np.full((2, len(text)), -1, dtype=np.int32)
@@ -171,14 +178,14 @@ def find_plain(
         if move.target is not None:
             own = own[find_sound(text, text.first[own], move.target, are_sound)]
         if len(own):
-            several, name[own] = _tell_apart(text, own, move)
+            several, name[own] = _tell_apart(text, own, move, alike)
             variant[own] = len(moves) + several
             moves += [move] * (int(several.max()) + 1)
     return PlainMoves(moves, variant, name)
 
 
 def _tell_apart(
-    text: Statements[Any], rows: Ints, move: PlainMove
+    text: Statements[Any], rows: Ints, move: PlainMove, alike: Ints | None
 ) -> tuple[Ints, Indices]:
     """Number the moves of one form by all that they say but where they go.
 
@@ -193,6 +200,7 @@ def _tell_apart(
         target = move.target.every if move.target else frozenset[int]()
         other = {*range(count)} - target - {*move.index}
     columns = [names[:, k] for k in range(names.shape[1]) if k != at]
+    columns = columns if alike is None else [alike[one] for one in columns]
     begin = text.first[rows]
     columns += [text.value[begin + k].view(np.int64) for k in sorted(other)]
     return number_rows(columns, len(rows))[0], goal
@@ -258,22 +266,25 @@ def find_runs(
         joins: Rows that several ways lead to.
         plain: The moves of its file.
         variant: The variant of each of its rows, (n,), -1 for what is no plain move.
-        ends: The first and the last of a block are read by themselves: what comes
+        ends: The first and the last move of a block are read by themselves: what comes
             before or behind tells of them.
     """
-    n, planner = len(variant), plain.planner[variant]
-    loud = np.flatnonzero(variant < 0)
-    cuts = [row - first for row in joins if 0 <= row - first < n]
-    cuts += (np.flatnonzero(np.diff(planner)) + 1).tolist()
+    n, loud = len(variant), np.flatnonzero(variant < 0)
     going = np.flatnonzero(plain.going[variant])
+    planner = plain.planner[variant[going]]
+    cuts = [row - first for row in joins if 0 <= row - first < n]
+    cuts += going[np.flatnonzero(np.diff(planner)) + 1].tolist()
     begin = np.union1d(np.append(loud + 1, 0), cuts).astype(np.int64)
     end = np.append(begin[1:], n)
     at = np.searchsorted(going, begin)
-    begin = np.append(going, n)[at]  # behind what does nothing
+    begin = np.append(going, n)[at]  # behind what does not move
     end = np.minimum(end, np.append(loud, n)[np.searchsorted(loud, begin)])
-    begin, end = first + begin + ends, first + end - ends
-    long = end - begin >= LEAST
-    return dict(zip(begin[long].tolist(), end[long].tolist(), strict=True))
+    if ends:
+        last = np.append(-1, going)[np.searchsorted(going, end)]
+        begin, end = begin + 1, last
+    long = np.diff(np.searchsorted(going, [begin, end]), axis=0)[0] >= LEAST
+    begin, end = first + begin[long], first + end[long]
+    return dict(zip(begin.tolist(), end.tolist(), strict=True))
 
 
 def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
@@ -286,6 +297,31 @@ def rows_of_lines(text: StatementText[Any], lines: Collection[int]) -> set[int]:
 
 Chosen = tuple[Sequence[FoundVisit], Ints, Ints]
 """Arrivals, the one that stands for each move of k, and the move of each."""
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What the k moves of a block are made with.
+
+    Attributes:
+        begin, end: Modes where the program came to it the last time, and left it.
+        modes: All that any of them is made with, m.
+        stage: Index into `modes` of each move, (k,).
+    """
+
+    begin: Any
+    end: Any
+    modes: Sequence[Any]
+    stage: Ints
+
+    def join(self, before: Stages) -> Self:
+        """Keep what is the same for each move as it was before."""
+        pairs, first = number_rows([before.stage, self.stage], len(self.stage))
+        olds, news = (
+            [one.modes[k] for k in one.stage[first].tolist()] for one in (before, self)
+        )
+        joined = [a.join(b) for a, b in zip(olds, news, strict=True)]
+        return replace(self, modes=joined, stage=pairs)
 
 
 @dataclass
@@ -301,6 +337,7 @@ class MoveBlock(FoundVisit):
         names: What each goes to, k, or none where no name is said.
         aux: External axes of each, (k, a), None where they are those of the example.
         values: Numbers of each, (k, w), None where the text has them.
+        stages: What they are made with, where statements between them may set that.
     """
 
     at_once: Ints = field(kw_only=True)
@@ -310,6 +347,7 @@ class MoveBlock(FoundVisit):
     names: NameColumn | None = field(kw_only=True, default=None)
     aux: Floats | None = field(kw_only=True, default=None)
     values: Floats | None = field(kw_only=True, default=None)
+    stages: Stages | None = field(kw_only=True, default=None)
 
     @classmethod
     def of(cls, chosen: Chosen, rows: Ints, origin: Ints, **more: Any) -> Self:
@@ -342,15 +380,6 @@ class MoveBlock(FoundVisit):
     def members(self) -> Sequence[Ints]:
         """The moves that each example stands for, by their place among these."""
         return [own for _, own in split_by(self.group)]
-
-
-def split_by(values: Ints | Indices) -> Iterator[tuple[int, Ints]]:
-    """Yield each of some values, ascending, and where it stands, (m,)."""
-    order = np.argsort(values, kind="stable")
-    ascending = values[order]
-    cuts = np.flatnonzero(np.diff(ascending)) + 1
-    for own in np.split(order, cuts) if len(order) else ():
-        yield int(values[own[0]]), own
 
 
 def choose_examples(

@@ -11,6 +11,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.declarations import TaskFile
 from postproc.language.analysis.symbols import TaskSymbols, holds_odd
@@ -33,9 +34,54 @@ class SharedChange:
     line: int
 
 
-def describe_changes(changes: Sequence[SharedChange]) -> str:
-    """Say why data are not known that others change, and what to do about it."""
-    first = changes[0]
+@dataclass(frozen=True)
+class OutsideCall:
+    """A call of a routine that the program does not hold.
+
+    Attributes:
+        name: Of the routine.
+        file, line: Where the call stands.
+    """
+
+    name: str
+    file: str
+    line: int
+
+
+def list_outside_calls(task: TaskSymbols[Any]) -> Iterator[OutsideCall]:
+    """Yield the first call of each routine that other programs may hold."""
+    for file in (one for one in task.files if one.routines):
+        names = {*ir.names_called(*file.text.said.said)} - task.routines.keys()
+        for row in file.text.where(lambda one: bool(ir.names_called(one))):
+            for name in ir.names_called(file.text.statement(row)) & names:
+                names.discard(name)
+                at = file.text.source.name, file.text.line(row)
+                yield OutsideCall(name, *at)
+            if not names:
+                break
+
+
+def describe_call(call: OutsideCall) -> str:
+    """Say why a routine begins anywhere, and what to do about it."""
+    where = f"{call.file.rpartition('/')[2]} (line {call.line})"
+    return (
+        f"{call.name.upper()} is called by {where} too: place, frames, load and modes "
+        "at its beginning are not known. Set them in it, and begin with a move by "
+        "joint angles"
+    )
+
+
+def describe_changes(
+    changes: Sequence[SharedChange], index: tuple[int, ...] = ()
+) -> str:
+    """Say why data are not known that others change, and what to do about it.
+
+    Args:
+        changes: All changes of the data.
+        index: Of the element that is meant.
+    """
+    own = (one for one in changes if not index or one.index in ((), index))
+    first = next(own, changes[0])
     where = f"{first.file.rpartition('/')[2]} (line {first.line})"
     return (
         f"may be changed by {where}: set it before the moves that take it, or, if that "

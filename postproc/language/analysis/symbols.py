@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import (
     NO_POINTS,
@@ -21,6 +22,7 @@ from postproc.language.analysis.assigned_points import (
     PointPart,
     Points,
     Scope,
+    find_added,
     source_of,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, TaskRoutine
@@ -46,10 +48,37 @@ from postproc.language.analysis.values import (
 from postproc.language.analysis.visit_columns import Numbering
 from postproc.language.language import Start
 from postproc.language.text.comment_directives import Comments
-from postproc.language.text.templates import name_index
+from postproc.language.text.templates import Shapes, name_index, split_by
 
 DEEPEST = 20  # names that stand for names
 F = TypeVar("F", bound=TaskFile)
+
+
+@dataclass(frozen=True)
+class FreeName:
+    """An open name of a form: what it is noted for, the same in every statement.
+
+    Attributes:
+        at: Which of the open names it is.
+        read: Its data are read.
+        target: What its data are copied to, whole; "" where they are not.
+    """
+
+    at: int
+    read: bool = False
+    target: str = ""
+
+    @property
+    def is_noted(self) -> bool:
+        """Whether it is noted for anything."""
+        return self.read or bool(self.target)
+
+    def note(self, uses: NamesUsed, names: Iterable[str]) -> None:
+        """Note what the statements of the form name there."""
+        if self.read:
+            uses.read.update(names)
+        else:
+            uses.copies.update((self.target, name) for name in names)
 
 
 @dataclass
@@ -205,20 +234,35 @@ class TaskSymbols(ABC, Generic[F]):
         """List the values that a statement takes when it runs, with all in them."""
         return ir.walk(one)
 
-    def free_name(self, one: ir.SourceStatement) -> int:
-        """Return which open name is only where a move goes, -1 for none.
+    def free_names(self, one: ir.SourceStatement) -> list[FreeName]:
+        """Return the open names of a form that are noted once for all its statements.
 
-        What a move takes and changes is the same whatever point it goes to.
+        Those are where a move goes, what is declared, what is copied whole, and what
+        else a language adds.
         """
-        to = self.plain_end(one)
-        if not isinstance(to, ir.DataObject) or to.steps:
-            return -1
-        return name_index(to.name)
+        if (copied := _find_copied(one)) is not None:
+            return [copied]
+        name, to = "", self.plain_end(one)
+        if isinstance(one, ir.Declaration) and len(one.items) == 1:
+            name = one.items[0].name
+        elif isinstance(to, ir.DataObject) and not to.steps:
+            name = to.name
+        at = name_index(name)
+        return [FreeName(at)] if at >= 0 else []
 
     def plain_end(self, one: Any) -> ir.Operand | None:
         """Return where a move goes that does nothing else, None for all other lines.
 
         But for data by name, and numbers, nothing stands in it that could differ.
+        """
+        return None
+
+    def find_alike(self, file: int) -> Ints | None:
+        """Find which names in a file are those of data that always hold the same.
+
+        Returns:
+            What stands for each name of its text, (n,), by their index; None: each
+            stands for itself.
         """
         return None
 
@@ -406,8 +450,8 @@ class TaskSymbols(ABC, Generic[F]):
         """The names that statements change and take."""
         uses = self.new_uses()
         for number, file in enumerate(self.files):
-            for one in () if file.is_submit else self._list_live(number):
-                self.note_in(uses, file, one)
+            if not file.is_submit:
+                self._note_live(uses, number)
         self.note_odd(uses)
         kept = {datum.name for datum in self.every_datum if self.outlives(datum)}
         for routine in self.every_routine:  # parameters may stand for any data
@@ -417,18 +461,23 @@ class TaskSymbols(ABC, Generic[F]):
         uses.pass_on()
         return uses
 
-    def _list_live(self, number: int) -> Iterable[ir.SourceStatement]:
-        """Return what the statements of a file say, but for routines that are dead.
+    def _note_live(self, uses: NamesUsed, number: int) -> None:
+        """Note what the statements of a file say, but for routines that are dead.
 
         Those are left out that declare what is written in numbers alone.
         """
-        text = self.files[number].text
-        live = text.which(_names_data)
+        file = self.files[number]
+        text, live = file.text, file.text.which(_names_data)
         for routine in self.routines_by_file[number] if self.dead else ():
             if routine.key in self.dead:
                 live[routine.inside.start : routine.inside.stop] = False
-        shapes = text.said.distinct(np.unique(text.shape[live]), self.free_name)
-        return [text.said[k] for k in shapes.tolist()]
+        shapes = np.unique(text.shape[live])
+        free = [self.free_names(one) for one in text.said.said]
+        apart = [[one.at for one in some] for some in free]
+        for k in text.said.distinct(shapes, apart).tolist():
+            self.note_in(uses, file, text.said[k])
+        for form, at in split_by(text.said.form[shapes]):
+            _note_free(uses, text.shapes, shapes[at], free[form])
 
     @cached_property
     def dead(self) -> frozenset[tuple[int, int]]:
@@ -829,8 +878,10 @@ class TaskSymbols(ABC, Generic[F]):
             return mine is not None and mine == theirs
         if (one.copied, one.goal is None) != (other.copied, other.goal is None):
             return False
-        parts = [[(c.name, c.value) for c in p.components] for p in (one, other)]
-        if parts[0] != parts[1] or any(value is None for _, value in parts[0]):
+        parts = [
+            [(c.name, c.value, c.along) for c in p.components] for p in (one, other)
+        ]
+        if parts[0] != parts[1] or any(value is None for _, value, _ in parts[0]):
             return False
         return one.base == other.base and (one.base is None or is_written(one.base))
 
@@ -884,12 +935,22 @@ class TaskSymbols(ABC, Generic[F]):
         if part.index is None:
             return points.forget(part.place)
         there = replace(here, points=points)
-        return points.give(self._give_value(part, part.index, one.value, there))
+        along = bool(find_added(one.target, one.value))
+        return points.give(self._give_value(part, part.index, one.value, there, along))
 
     def _give_value(
         self, part: PointPart, index: tuple[int, ...], value: ir.Operand, here: Scope,
+        along: bool = False,
     ) -> AssignedPoint:  # fmt: skip
-        """Return what a point holds that is given a value, or a component of it."""
+        """Return what a point holds that is given a value, or a component of it.
+
+        Args:
+            part: What is given the value.
+            index: Of the element.
+            value: The value.
+            here: The assignment.
+            along: It adds something to the component.
+        """
         place, own = part.place, frozenset([part.place[-1]])
         known = None if part.component else self.find_held(value, here)
         if known is not None:
@@ -911,7 +972,7 @@ class TaskSymbols(ABC, Generic[F]):
             point = known or self._give_whole(part, index, source, base, plain)
             point = point.copy_to(place, index, own)
         parts = self.list_components(part, found)
-        numbers = [Component(*one, here.file, here.row) for one in parts]
+        numbers = [Component(*one, here.file, here.row, along) for one in parts]
         return point.with_components(numbers, names)
 
     def _give_whole(
@@ -1002,6 +1063,33 @@ def _names_data(one: ir.SourceStatement) -> bool:
     """Return True unless a statement declares data whose values name none."""
     values = ir.walk(one) if isinstance(one, ir.Declaration) else [ir.DataObject("")]
     return any(isinstance(part, ir.DataObject | ir.FunctionCall) for part in values)
+
+
+def _find_copied(one: ir.SourceStatement) -> FreeName | None:
+    """Return what is copied whole, to data whose name is not open; None for others."""
+    match one:
+        case ir.Assignment(
+            target=ir.DataObject(name=target, steps=()),
+            value=ir.DataObject(name=name, steps=()),
+        ) if name_index(target) < 0 <= name_index(name):
+            return FreeName(name_index(name), target=target)
+    return None
+
+
+def _note_free(
+    uses: NamesUsed, shapes: Shapes, own: Ints, free: Sequence[FreeName]
+) -> None:
+    """Note what shapes of one form name where that is noted for all at once.
+
+    Args:
+        uses: What notes it.
+        shapes: The shapes of a file.
+        own: Those of the form, (m,).
+        free: Where.
+    """
+    for one in (name for name in free if name.is_noted):
+        used = np.unique(shapes.names_at(own)[:, one.at]).astype(np.int64)
+        one.note(uses, shapes.names.take(used).lower())
 
 
 def _is_loop(one: ir.SourceStatement) -> bool:

@@ -21,6 +21,7 @@ from postproc.language.analysis.move_blocks import (
     PlainMove,
     PlainMoves,
     Runs,
+    Stages,
     TargetSlots,
     choose_examples,
     find_plain,
@@ -107,6 +108,23 @@ class BlockMachine(Interpreter[S]):
         """Return what plans a move, where there are several that tell moves apart."""
         return ""
 
+    def is_setting(self, one: Any) -> bool:
+        """Return True if a statement does nothing but change modes, whatever they are.
+
+        Moves before and behind it are read at once. What it sets goes by its numbers,
+        and by data; it has no part in where the arm is and stops, nor in points.
+        """
+        return False
+
+    @abstractmethod
+    def set_modes(self, at: At, here: Any) -> Any:
+        """Return what a statement makes of what holds that does nothing but set modes.
+
+        Args:
+            at: The statement.
+            here: How the arm comes to it.
+        """
+
     @abstractmethod
     def read_visits(
         self, one: ir.SourceStatement, scope: Scope, here: Any
@@ -146,37 +164,74 @@ class BlockMachine(Interpreter[S]):
         if file not in self._plain:
 
             def read(one: ir.SourceStatement) -> PlainMove | None:
+                if self.is_setting(one):
+                    return PlainMove("")
                 end, planner = self.task.plain_end(one), self.planner_of(one)
                 return PlainMove.to(end, self.task.slots_of, planner)
 
             sound, text = self.reader.are_sound, self.texts[file]
             apart = rows_of_lines(text, self.task.taught_lines[file])
             apart |= self.list_apart(file)
-            self._plain[file] = find_plain(text, read, sound, apart)
+            alike = self.task.find_alike(file)
+            self._plain[file] = find_plain(text, read, sound, apart, alike)
         return self._plain[file]
 
     # What a block stands for.
 
-    def read_block(self, at: At, behind: int, here: Any) -> MoveBlock:
+    def read_block(
+        self, at: At, behind: int, here: Any, old: MoveBlock | None = None
+    ) -> MoveBlock:
         """Read the moves of a block.
 
         Args:
             at: The first of them.
             behind: The row behind the last.
             here: How the arm comes to it.
+            old: What it was read as before, None where it was not.
         """
-        rows = np.arange(at.row, behind)
+        plain = self._plain[at.place.scope.file]
+        every = np.arange(at.row, behind)
+        rows = every[plain.going[plain.variant[every]]]
+        stages, modes = self._follow_settings(at, every, here), here.modes
+        if old is not None and old.stages is not None:
+            stages, modes = stages.join(old.stages), old.modes.join(modes)
         targets = self._find_targets(at.place.scope, rows, here.points)
+        made = [here.with_modes(one) for one in stages.modes]
         chosen = choose_examples(
-            self._tell_apart(targets), targets.kind == ALONE,
-            lambda k: self._read_one(at, int(rows[k]), here),
+            [*self._tell_apart(targets), stages.stage], targets.kind == ALONE,
+            lambda k: self._read_one(at, int(rows[k]), made[stages.stage[k]]),
             lambda k: self._slots_at(targets, k),
         )  # fmt: skip
         names = NameColumn(targets.names) if any(targets.names) else None
         return MoveBlock.of(
-            chosen, rows, targets.origin, modes=here.modes, points=here.points,
-            names=names,
+            chosen, rows, targets.origin, modes=modes, points=here.points, names=names,
+            stages=stages,
         )  # fmt: skip
+
+    def _follow_settings(self, at: At, rows: Ints, here: Any) -> Stages:
+        """Follow what statements between the moves of a block set, each kind once.
+
+        Args:
+            at: The first row of the block.
+            rows: Its rows, (n,).
+            here: How the arm comes to it.
+        """
+        plain = self._plain[at.place.scope.file]
+        kinds = plain.variant[rows]
+        going = plain.going[kinds]
+        between, now = np.flatnonzero(~going), 0
+        states, behind = [here], [0] * (len(between) + 1)
+        number, after = {here.modes: 0}, dict[tuple[int, int], int]()
+        pairs = zip(rows[between].tolist(), kinds[between].tolist(), strict=True)
+        for k, (row, kind) in enumerate(pairs, start=1):
+            if (now, kind) not in after:
+                found = self.set_modes(at.to(row), states[now])
+                after[now, kind] = number.setdefault(found.modes, len(states))
+                states += [found] if after[now, kind] == len(states) else []
+            behind[k] = now = after[now, kind]
+        modes = [one.modes for one in states]
+        at_moves = np.searchsorted(between, np.flatnonzero(going))
+        return Stages(modes[0], modes[now], modes, np.array(behind)[at_moves])
 
     def _read_one(self, at: At, row: int, here: Any) -> FoundVisit:
         """Read a move of a block by itself."""

@@ -336,17 +336,24 @@ class TaskMachine(BlockMachine[Arrived]):
             self.visits.append(self.read_block(at, behind, state))
         else:
             self._read_block_again(at, behind, state, known[0])
-        after = self._come_from(known, at, state)
+        end = self.visits[known[0]].stages.end
+        after = self._come_from(known, at, state).with_modes(end)
         return behind, None if self._went_on(at, after) else after
+
+    def set_modes(self, at: At, here: Arrived) -> Arrived:
+        """Carry a statement out that does nothing but set modes."""
+        after = self.carry_out(at, at.statement, here)
+        assert after is not None
+        assert after.origins == here.origins
+        return here.with_modes(after.modes)
 
     def _read_block_again(
         self, at: At, behind: int, here: Arrived, number: int
     ) -> None:
         """Read a block with what is known by now, see `_read_again`."""
         old = self.visits[number]
-        modes = old.modes.join(here.modes)
-        if (modes, here.points) != (old.modes, old.points):
-            new = self.read_block(at, behind, here.with_modes(modes))
+        if (here.modes, here.points) != (old.stages.begin, old.points):
+            new = self.read_block(at, behind, here, old)
             new.origins, new.left = old.origins, old.left
             self.visits[number] = new
 

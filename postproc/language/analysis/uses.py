@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from postproc.language import ir
-from postproc.language.analysis.assigned_points import is_point, source_of
+from postproc.language.analysis.assigned_points import (
+    find_added,
+    is_point,
+    source_of,
+)
 from postproc.language.analysis.declarations import TaskRoutine
 
 
@@ -187,10 +191,16 @@ class NamesUsed:
                 self.take(argument.value)
 
     def _note_assignment(self, target: ir.DataObject, value: ir.Operand) -> None:
-        """Note what an assignment takes: a point that moves go to by another name."""
-        source = source_of(value)
+        """Note what an assignment takes: a point that moves go to by another name.
+
+        What is added to a component of a point shifts it.
+        """
+        source, added = source_of(value), find_added(target, value)
         self._take_subscripts(target)
-        if source is None or not (is_point(target) and is_point(source)):
+        if added:
+            for one in added:
+                self.take(one)
+        elif source is None or not (is_point(target) and is_point(source)):
             self.take(value)
         elif value is source:
             self._take_subscripts(source)

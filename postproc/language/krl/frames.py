@@ -145,11 +145,25 @@ class FrameReader:
             return held
         found = self.task.datum(table, self.here, (number,))
         if found is not None and self.task.is_steady(table, (number,)):
+            frame = self._read_first(table, number, (found[0], found[1].row))
+            if frame.pose:
+                return frame
+        return TaskFrame((), self._unknown(shown, table, (number,)))
+
+    def _read_first(self, table: str, number: int, at: tuple[int, int]) -> TaskFrame:
+        """Read what an entry holds at first, once; no pose where that is not known.
+
+        Args:
+            table: The table.
+            number: .. and the entry.
+            at: File and row that give its value.
+        """
+        if at not in self.task.first_frames:
             pose = pose_of(self.task.entry(table, number, self.here))
-            taught = self.task.is_taught(table, found[0], found[1].row)
-            if pose:
-                return self._make(pose, taught)
-        return TaskFrame((), self._unknown(shown, table))
+            taught = self.task.is_taught(table, *at)
+            frame = self._make(pose, taught) if pose else TaskFrame(())
+            self.task.first_frames[at] = frame
+        return self.task.first_frames[at]
 
     def _read_held(self, name: str, key: str) -> object | None:
         """Return what the program has set, unless something beside it may change it."""
@@ -165,8 +179,8 @@ class FrameReader:
         free = isinstance(value, KnownRecord) and value.number("mach_def_index") == 0.0
         return not free
 
-    def _unknown(self, shown: str, name: str) -> Reason:
-        code, text = self.task.explain_unknown(name, self.here)
+    def _unknown(self, shown: str, name: str, index: tuple[int, ...] = ()) -> Reason:
+        code, text = self.task.explain_unknown(name, self.here, index)
         where = f" ({CONFIG}.dat)" if code is Code.UNDECLARED_VARIABLE else ""
         return Reason(code, f"{shown} {text}{where}")
 

@@ -14,6 +14,7 @@ from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_context import At, Context
 from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import TaskRoutine
+from postproc.language.analysis.shared_changes import describe_call
 from postproc.language.analysis.symbols import whole
 from postproc.language.analysis.task_machine import (
     MOVES,
@@ -23,6 +24,7 @@ from postproc.language.analysis.task_machine import (
     scope_at,
 )
 from postproc.language.krl import syntax as said
+from postproc.language.krl.inline_forms import sets_modes, takes_plain
 from postproc.language.krl.modal_state import (
     HALTING,
     HARMLESS,
@@ -111,11 +113,29 @@ class KrlMachine(TaskMachine):
         first = self.task.files[0]
         here = self.begin(frozenset([START]), modes)
         main = TaskRoutine(0, first.name, first.routines[0])
-        self.call_routine(main, None, here)
+        if main.rows.head.name not in self.task.outside_calls:
+            self.call_routine(main, None, here)
+        self._begin_anywhere(here)
         self.follow()
         for name, (file, row) in self._assumed.items():
             place, text = Scope(file, "", "", row=row), f"{name.upper()} {ASSUMED}"
             self.say(place, Code.ROUTINE_ASSUMED_MOTIONLESS, text)
+
+    def _begin_anywhere(self, here: Arrived) -> None:
+        """Begin the routines that other programs call, wherever these are then.
+
+        Modes are those of any program as long as none sets others.
+        """
+        kept = {"orientation", "interpolation"} - self.task.outside_modes
+        own = {name: getattr(here.modes, name) for name in kept}
+        lost = here.forget()
+        lost = replace(lost, modes=lost.modes.with_(**own))
+        for name, call in self.task.outside_calls.items():
+            for one in self.task.routines[name]:
+                if not one.rows.head.local:
+                    place = Scope(one.file, "", "", row=one.rows.first)
+                    self.say(place, Code.CALLED_BY_OTHERS, describe_call(call))
+                    self.call_routine(one, None, lost)
 
     # What a statement is.
 
@@ -133,6 +153,15 @@ class KrlMachine(TaskMachine):
         file = self.task.files[context.place.scope.file]
         alone = self._has_interrupts or file.is_system
         return super().reads_at_once(context) and not alone
+
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True for what inline forms set; some routines do nothing at all."""
+        if isinstance(one, ir.Instruction) and one.name not in self.task.routines:
+            known = package_routines().get(one.name) == AHEAD
+            if known and not self._is_overruled(one.name):
+                return takes_plain(one.arguments)
+        own = "bas" in self.task.routines or self.task.copies_are_points
+        return sets_modes(one) and not own
 
     def list_apart(self, file: int) -> set[int]:
         """Return the points of splines."""
@@ -159,10 +188,16 @@ class KrlMachine(TaskMachine):
 
     @cached_property
     def _has_interrupts(self) -> bool:
-        """Return True if interrupts or triggers may call routines."""
+        """Return True if interrupts or triggers may move the arm, or end its moves."""
         kinds = said.InterruptDeclared | said.PathTrigger
-        said_ones = (one for file in self.task.files for one in file.text.said.said)
-        return any(isinstance(one, kinds) for one in said_ones)
+        for number, file in enumerate(self.task.files):
+            here = Scope(number, file.name, "")
+            for row in file.text.of_kind(lambda one: isinstance(one, kinds)):
+                one = file.text.statement(row)
+                assert isinstance(one, kinds)
+                if self.effects_of(one.action, here):
+                    return True
+        return False
 
     # What it does.
 

@@ -15,7 +15,7 @@ from postproc.language.krl.archive import read_archive
 from postproc.language.krl.clones import KrlCloner
 from postproc.language.krl.files import KrlFileName
 from postproc.language.krl.interpreter import KrlMachine
-from postproc.language.krl.other_programs import changing_programs
+from postproc.language.krl.other_programs import find_other_programs
 from postproc.language.krl.pose_encoding import KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.symbols import KrlTask
@@ -89,7 +89,7 @@ class Krl(TaskLanguage):
         if not named.is_program:
             return ()
         shared = (*named.find_shared(listing), *acting_sources(program, listing))
-        return (*shared, *changing_programs(program, listing))
+        return (*shared, *find_other_programs(program, listing))
 
     read_archive = staticmethod(read_archive)
 

@@ -13,7 +13,7 @@ from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.conditions import ModalState, TaskFrame
 from postproc.language.analysis.symbols import whole
-from postproc.language.analysis.values import KnownRecord
+from postproc.language.analysis.values import KnownRecord, without_places
 from postproc.language.krl import symbols
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import (
@@ -84,6 +84,11 @@ class KrlModes(ModalState):
     perhaps: bool = False
     declared: frozenset[tuple[int, Reason]] = frozenset()
     active: frozenset[tuple[int, Reason]] = frozenset()
+
+    def __hash__(self) -> int:
+        """Allow to look modes up by what inline forms set of them."""
+        held = frozenset(self.store.items())
+        return hash((self.speed, self.share, self.distance, self.overlap, held))
 
     def unknown_state(self) -> KrlModes:
         """Return it where nothing is known."""
@@ -346,8 +351,8 @@ class ModeReader:
         elif name in symbols.HELD:
             found = self.frames(modes).frame(one.value)
             value = None if found.why else found
-        elif name not in self.task.beside:
-            value = self.task.value(one.value, self.here)
+        elif name not in self.task.beside:  # which of the forms' data it is counts not
+            value = without_places(self.task.value(one.value, self.here))
         return modes.hold(name, value)
 
     def _number(self, operand: ir.Operand | None) -> float:

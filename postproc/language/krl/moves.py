@@ -151,6 +151,7 @@ class KrlGoal(goals.GoalReader):
     task: symbols.KrlTask
     dialect = pose_encoding.KRL_DIALECT
     brackets = "[]"
+    places = PLACE[:3]
     shout = True
     system = "it stands in a system file, which is read and not rewritten"
     outlives = "stands in a data list: it outlives the run"

@@ -1,13 +1,19 @@
-"""Other programs of a folder or an archive that change what all programs share."""
+"""Other programs of a folder or an archive that a program depends on."""
 
 from __future__ import annotations
 
 import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 
+from postproc import _native
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
+from postproc.language.file_name import list_led
 from postproc.language.krl.files import (
     SHARED_LIST,
     USER_SOURCES,
@@ -15,47 +21,88 @@ from postproc.language.krl.files import (
     find_in_archive,
 )
 from postproc.language.krl.imports import list_imports
-from postproc.language.krl.symbols import HELD, list_changes
+from postproc.language.krl.symbols import HELD, find_modes, list_calls, list_changes
+from postproc.language.outputs import is_beside_source, version_of
 from postproc.language.text.source import source_from_bytes
-from postproc.language.text.stamp import read_stamp
 
 READ_BEFORE = 8192  # files of which is known what they change, or declare
+CALLERS = 3  # programs that are read of those that call a routine
 _WORD = re.compile(rb"[A-Za-z_$]\w*")
 _GLOBAL = re.compile(rb"^[^;\n]*\bGLOBAL\b[^;\n]*", re.IGNORECASE | re.MULTILINE)
+_ROUTINE = re.compile(
+    rb"[ \t]*GLOBAL[ \t]+(?:DEF|DEFFCT[ \t]+[\w\[\], ]+)[ \t]+(\w+)[ \t]*\(",
+    re.IGNORECASE,
+)
+Files = tuple[Path, ...]  # a program, and its data list
 
 
-def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]:
-    """Return other programs that change shared data, each with its data list.
+@dataclass(frozen=True)
+class OtherPrograms:
+    """Programs of a folder, or of its archive, that others must know.
 
-    Outputs and sources of the controller do not count.
+    Attributes:
+        changing: Those that change what all share.
+        calling: Those that call a routine which they do not hold, by its name.
+        modal: Some of those that leave other modes than a program begins with.
     """
-    found = listing.beside(program, _find_changing)
-    own = program.stem.lower()
-    return tuple(one for one in found if one.stem.lower() != own)
+
+    changing: Sequence[Files]
+    calling: Mapping[str, Sequence[Files]]
+    modal: Sequence[Files]
 
 
-def _find_changing(folder: Path, listing: FolderListing, but: str) -> list[Path]:
-    """Find programs of a folder, or of its archive, that change what all share."""
+def find_other_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]:
+    """Return other programs that change shared data, or call a program.
+
+    Each is followed by its data list. Sources of the controller do not count, nor do
+    outputs beside their sources.
+    """
+    if not program.absolute().parent.is_dir():
+        return ()
+    found = listing.beside(program, _find_others)
+    if not (found.changing or found.calling):
+        return ()
+    led = list_led(KrlFileName(str(program)), listing) if found.calling else [program]
+    own = {path.stem.lower() for path in led}
+    calling = list[Files]()
+    for path in led:
+        for name in (path.stem.lower(), *_list_global(path, *version_of(path))):
+            callers = found.calling.get(name, ())
+            calling += [c for c in callers if c[0].stem.lower() not in own][:CALLERS]
+    modal = found.modal if calling else ()
+    every = dict.fromkeys((*found.changing, *calling, *modal))
+    main = program.stem.lower()
+    others = (files for files in every if files[0].stem.lower() != main)
+    return tuple(chain.from_iterable(others))
+
+
+def _find_others(folder: Path, listing: FolderListing, but: str) -> OtherPrograms:
+    """Find programs of a folder, or of its archive, that others must know."""
     sources = find_in_archive(folder, KrlFileName.programs, listing)
-    others = [one for one in sources if one.name.lower() not in (but, *USER_SOURCES)]
-    if not others:
-        return []
+    named = (one for one in sources if one.name.lower() not in (but, *USER_SOURCES))
+    others = [one for one in named if not is_beside_source(one, listing)]
+    changing, calling = list[Files](), defaultdict[str, list[Files]](list)
+    modal = list[Files]()
     lists = find_in_archive(folder, (KrlFileName.data_lists,), listing)
-    shared = HELD.union(*(_list_shared(one, *_version(one)) for one in lists))
-    found: list[Path] = []
+    lists = lists if others else ()
+    shared = HELD.union(*(_list_shared(one, *version_of(one)) for one in lists))
     for other in others:
         values = listing.named(other.parent, f"{other.stem}{KrlFileName.data_lists}")
-        own = [other] if values is None else [other, values]
-        changed, imports = _read_changes(*((one, *_version(one)) for one in own))
-        if imports or not shared.isdisjoint(changed):
-            found += own
-    return found
+        own = (other,) if values is None else (other, values)
+        changed, called = _read_acts(*((one, *version_of(one)) for one in own))
+        changing += [own] if IMPORTS in changed or changed & shared else []
+        modal += [own] if MODES in changed and len(modal) < CALLERS else []
+        for name in called:
+            calling[name].append(own)
+    return OtherPrograms(changing, calling, modal)
 
 
-def _version(path: Path) -> tuple[int, int]:
-    """Return what tells a file from what it was before."""
-    status = path.stat()
-    return status.st_mtime_ns, status.st_size
+@lru_cache(READ_BEFORE)
+def _list_global(path: Path, changed: int, size: int) -> tuple[str, ...]:
+    """Return the names of the GLOBAL routines of a program, in lower case."""
+    lines = _native.lines_beginning(read_if_readable(path), (b"global",))
+    found = filter(None, (_ROUTINE.match(line) for _, line in lines))
+    return tuple(one[1].decode("latin-1").lower() for one in found)
 
 
 @lru_cache(READ_BEFORE)
@@ -68,20 +115,29 @@ def _list_shared(path: Path, changed: int, size: int) -> frozenset[str]:
     return frozenset(word.decode("latin-1").lower() for word in _WORD.findall(text))
 
 
+IMPORTS, MODES = "import", "$modes"
+"""Among the names that a program changes: it imports some, it leaves other modes."""
+
+
 @lru_cache(READ_BEFORE)
-def _read_changes(*versions: tuple[Path, int, int]) -> tuple[frozenset[str], bool]:
-    """Return what a program may change of others' data, and whether it imports any.
+def _read_acts(
+    *versions: tuple[Path, int, int],
+) -> tuple[frozenset[str], frozenset[str]]:
+    """Return what a program may change of others' data, and what it calls of others.
 
     Args:
         versions: The program and its data list, each as it is now.
     """
     texts = {path.name: read_if_readable(path) for path, _, _ in versions}
     name, text = next(iter(texts.items()))
-    if KrlFileName(name).is_system_source(text) or read_stamp(text) is not None:
-        return frozenset(), False
+    if KrlFileName(name).is_system_source(text):
+        return frozenset(), frozenset()
     try:
         sources = [source_from_bytes(*one) for one in texts.items()]
-        changes = list_changes(*sources)
+        changes, calls = list_changes(*sources), list_calls(*sources)
     except ProgramError:
-        return frozenset(), False
-    return frozenset(one.name for one in changes), bool(list_imports(sources))
+        return frozenset(), frozenset()
+    more = [IMPORTS] if list_imports(sources) else []
+    more += [MODES] if any(map(find_modes, sources)) else []
+    changed = frozenset([*(one.name for one in changes), *more])
+    return changed, frozenset(one.name for one in calls)

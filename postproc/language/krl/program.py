@@ -20,6 +20,7 @@ from postproc.language.text.source import Source
 from postproc.language.text.statement_table import StatementText, read_text
 
 _ROUTINES = ("def", "deffct")
+_RUNS = (said.KrlMove, ir.Instruction, ir.Assignment)
 _WORDS = ScopeWords({"end": "def", "endfct": "deffct", "enddat": "defdat"}, _ROUTINES)
 
 
@@ -65,7 +66,9 @@ def read_krl(source: Source) -> KrlFile:
     name = base_name(source.name)
     outline, splines, begin = Outline(text, _WORDS), list[range](), -1
     moves = text.of_kind(lambda one: isinstance(one, said.KrlMove))
-    for row in text.of_kind(lambda one: not isinstance(one, said.KrlMove)):
+    lists = any(isinstance(one, ir.ScopeHead) for one in text.said.said)
+    runs = (said.KrlMove, ir.Instruction) if lists else _RUNS  # and declares nothing
+    for row in text.of_kind(lambda one: not isinstance(one, runs)):
         if outline.declare(row, name):
             continue
         match one := text.statement(row):

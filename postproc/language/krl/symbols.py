@@ -2,38 +2,49 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.diagnostics import Code
 from postproc.language import ir
 from postproc.language.analysis.assigned_points import Scope
 from postproc.language.analysis.call_graph import reach
-from postproc.language.analysis.conditions import cell_pose
+from postproc.language.analysis.conditions import TaskFrame, cell_pose
 from postproc.language.analysis.declarations import Datum
 from postproc.language.analysis.move_blocks import TargetSlots
 from postproc.language.analysis.shared_changes import (
+    OutsideCall,
     SharedChange,
     collect_changes,
     describe_changes,
+    list_outside_calls,
     list_shared_changes,
 )
-from postproc.language.analysis.symbols import TaskSymbols, holds_odd, whole
+from postproc.language.analysis.symbols import (
+    FreeName,
+    TaskSymbols,
+    holds_odd,
+    whole,
+)
 from postproc.language.analysis.uses import NamesUsed
 from postproc.language.analysis.values import KnownRecord, Layout, Value, WrittenNumber
 from postproc.language.krl import syntax as said
 from postproc.language.krl.imports import list_imports
+from postproc.language.krl.inline_forms import COPIES, find_alike, sets_alone
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.shifts import Pose, Shift, ShiftKind
 from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 from postproc.language.text.symbol_column import read_names
+from postproc.language.text.templates import name_index
 
 CONFIG = "$config"
 ANY: tuple[int, ...] = ()  # an element whose index is not known
@@ -113,8 +124,13 @@ def entry_name(table: str, number: int) -> str:
 
 @dataclass
 class KrlTask(TaskSymbols[KrlFile]):
-    """The files of a job, the source first."""
+    """The files of a job, the source first.
 
+    Attributes:
+        first_frames: Entries of tables as they are at first, by file and row.
+    """
+
+    first_frames: dict[tuple[int, int], TaskFrame] = field(default_factory=dict)
     comments = COMMENTS
     layouts = FIELDS
     followed = (*FIELDS, "int", "real", "bool")
@@ -135,8 +151,10 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def is_exported(self, datum: Datum) -> bool:
         """Return True for GLOBAL data, and those that other programs import."""
+        if not self._imported:
+            return super().is_exported(datum)
         imported = (datum.module, datum.name) in self._imported
-        return super().is_exported(datum) or imported
+        return imported or super().is_exported(datum)
 
     @cached_property
     def _imported(self) -> frozenset[tuple[str, str]]:
@@ -147,13 +165,35 @@ class KrlTask(TaskSymbols[KrlFile]):
     @cached_property
     def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
         """What other programs change of the data that all share, by name."""
+        own = (list_changes(*sources) for sources in self._others)
+        changes = [*chain.from_iterable(own)]
         data = ((k, one) for k, file in enumerate(self.files) for one in file.data)
-        shared = HELD.union(one.name for k, one in data if self.shares(k, one))
-        programs = defaultdict[str, list[Source]](list)
+        known = (one.name for k, one in data if changes and self.shares(k, one))
+        shared = HELD.union(known)
+        return collect_changes(changes, shared, self.start)
+
+    @cached_property
+    def outside_calls(self) -> Mapping[str, OutsideCall]:
+        """Calls by other programs of routines that they know, the first of each."""
+        known = {
+            one.rows.head.name for one in self.every_routine if not one.rows.head.local
+        }
+        calls = chain.from_iterable(list_calls(*own) for own in self._others)
+        return {one.name: one for one in calls if one.name in known}
+
+    @cached_property
+    def outside_modes(self) -> frozenset[str]:
+        """Modes that other programs may leave otherwise than a program begins."""
+        found = (find_modes(one) for one in _sources(self.files_beside))
+        return frozenset[str]().union(*found)
+
+    @cached_property
+    def _others(self) -> Sequence[Sequence[Source]]:
+        """Other programs, each with its data list."""
+        found = defaultdict[str, list[Source]](list)
         for file in self.files_beside:
-            programs[file.name].append(file.text.source)
-        changes = (list_changes(*own) for own in programs.values())
-        return collect_changes(chain.from_iterable(changes), shared, self.start)
+            found[file.name].append(file.text.source)
+        return [*found.values()]
 
     def name_for_others(self, name: str) -> str:
         """Leave what programs set before each of their moves, see `TaskSymbols`."""
@@ -201,8 +241,16 @@ class KrlTask(TaskSymbols[KrlFile]):
         first = {file.name: number for number, file in reversed(by_kind)}
         return [first[file.name] for file in self.files]
 
-    def explain_unknown(self, name: str, here: Scope) -> tuple[Code, str]:
-        """Say why a name stands for no known value; the text goes behind the name."""
+    def explain_unknown(
+        self, name: str, here: Scope, index: tuple[int, ...] = ()
+    ) -> tuple[Code, str]:
+        """Say why a name stands for no known value; the text goes behind the name.
+
+        Args:
+            name: The name.
+            here: Where it stands.
+            index: Of an element.
+        """
         code = Code.RUNTIME_VALUE
         if name in here.parameters:
             return code, "is a parameter: what is given for it is not followed"
@@ -210,7 +258,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             text = "is declared in none of the given files, or in several of them"
             return Code.UNDECLARED_VARIABLE, text
         if others := self.changed_elsewhere.get(name):
-            return code, describe_changes(others)
+            return code, describe_changes(others, index)
         if name in self.written:
             text = "may be changed by the program: it is known only when that runs"
             return code, text
@@ -268,7 +316,7 @@ class KrlTask(TaskSymbols[KrlFile]):
             found[name] |= {one.index or ANY for one in self.changed_elsewhere[name]}
         for number, file in enumerate(self.files):
             there = Scope(number, "", "")
-            for row in file.text.of_kind(lambda one: bool(self.list_changes(one))):
+            for row in file.text.of_kind(lambda one: self._may_change(one, arrays)):
                 for target in self.list_changes(file.text.statement(row)):
                     given = not (file.routines or _is_of_part(target))
                     if target.name in arrays and not given:
@@ -276,6 +324,11 @@ class KrlTask(TaskSymbols[KrlFile]):
                         here = self.scope_of(routine) if routine else there
                         found[target.name].add(self.index_of(target, here.at(row)))
         return found
+
+    def _may_change(self, one: ir.SourceStatement, arrays: Collection[str]) -> bool:
+        """Return True if a statement whose numbered names are open may change some."""
+        names = [target.name for target in self.list_changes(one)]
+        return any(name in arrays or name_index(name) >= 0 for name in names)
 
     def initial_switch(self, name: str) -> bool | None:
         """Return a switch that the program has not set so far, None if not known.
@@ -355,10 +408,26 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     def plain_end(self, one: ir.SourceStatement) -> ir.Operand | None:
         """Return where a plain move goes, see `TaskSymbols.plain_end`."""
-        if not isinstance(one, said.KrlMove) or one.settings:
+        if not isinstance(one, said.KrlMove):
+            return None
+        if not all(sets_alone(setting, self.routines) for setting in one.settings):
             return None
         plain = one.word in ("ptp", "lin", "sptp", "slin") and one.via is None
         return one.to if plain and one.angle is None else None
+
+    def free_names(self, one: ir.SourceStatement) -> list[FreeName]:
+        """Add data that a move sets something to for itself alone."""
+        found = super().free_names(one)
+        if isinstance(one, said.KrlMove) and self.plain_end(one) is not None:
+            data = ir.data_in(*(setting.value for setting in one.settings))
+            places = (name_index(part.name) for part in data)
+            found += [FreeName(at, read=True) for at in places if at >= 0]
+        return found
+
+    def find_alike(self, file: int) -> Ints:
+        """Find the names of inline forms' data that hold the same."""
+        own = [one for k, one in enumerate(self.files) if self._units[k] == file]
+        return find_alike(self.files[file], own, self.written)
 
     def read_slots(self, operand: ir.Operand) -> TargetSlots | None:
         """Return the numbers of an aggregate, see `TaskSymbols.read_slots`."""
@@ -388,6 +457,12 @@ class KrlTask(TaskSymbols[KrlFile]):
         uses.written |= self.changed_elsewhere.keys()
         uses.read |= self.beside.union(*(part.read for part in self._beside))
         uses.read |= self.words_of_odd()
+
+    @cached_property
+    def copies_are_points(self) -> bool:
+        """Whether a program has points or numbers of the names that forms set."""
+        own = (one for one in self.every_datum if one.name in COPIES)
+        return any(one.type in self.followed for one in own)
 
     @cached_property
     def _points(self) -> frozenset[str]:
@@ -508,6 +583,27 @@ def list_changes(*sources: Source) -> tuple[SharedChange, ...]:
     """List what a program with its data list changes of what all share."""
     files = [parse_shared(read_krl, one) for one in sources]
     return tuple(list_shared_changes(KrlTask(files)))
+
+
+@lru_cache(KEPT_FILES)
+def list_calls(*sources: Source) -> tuple[OutsideCall, ...]:
+    """List the routines that a program calls and does not hold."""
+    files = [parse_shared(read_krl, one) for one in sources]
+    return tuple(list_outside_calls(KrlTask(files)))
+
+
+_MODE = re.compile(
+    rb"\b(?:(?P<orientation>ORI_TYPE?)|(?P<interpolation>IPO_MODE|IPO_FRAME))"
+    rb"[ \t]*(?:=[ \t]*|[ \t](?=#))(?!#?(?:VAR|BASE|SIPO_MODE|SORI_TYP)\b)",
+    re.IGNORECASE,
+)
+
+
+@lru_cache(KEPT_FILES)
+def find_modes(source: Source) -> frozenset[str]:
+    """Name the modes that a program, or its list, sets to others than at its begin."""
+    found = _MODE.finditer(source.data)
+    return frozenset(one.lastgroup or "" for one in found)
 
 
 def _sources(files: Sequence[KrlFile]) -> list[Source]:

@@ -57,7 +57,8 @@ class KrlCollector(to_visits.TaskCollector):
         """Find what ways to other arrivals tell of each."""
         runs: Sequence[FoundVisit] = machine.visits
         found: list[Any] = [v for run in runs for v in run.arrivals]
-        _keep_orientation(machine, found)
+        self.effective = {id(v): _effective(machine, v) for v in found}
+        _keep_orientation(found, self.effective)
         _follow_partial(machine, runs, found)
         super().__init__(machine)
         self.krl, self.base = machine, cell_pose(machine.task.start.base)
@@ -67,7 +68,7 @@ class KrlCollector(to_visits.TaskCollector):
     def arrive(self, v: KrlVisit) -> Arrival:
         """Say what an arrival is carried out with."""
         machine, at = self.krl, self.number[id(v)]
-        modes, unset = _effective(machine, v)
+        modes, unset = self.effective[id(v)]
         joint = v.motion == Motion.JOINT
         active = {why for _, why in modes.active}
         early = machine.early.get(at, frozenset())
@@ -185,10 +186,18 @@ def _ends(runs: Sequence[FoundVisit], lost: Container[int]) -> list[bool | None]
     return [True if s <= {True} else False if s == {False} else None for s in stops]
 
 
-def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
-    """Forget targets whose orientation the tool does not take."""
+def _keep_orientation(
+    found: Sequence[KrlVisit],
+    effective: Mapping[int, tuple[modal_state.KrlModes, Reason]],
+) -> None:
+    """Forget targets whose orientation the tool does not take.
+
+    Args:
+        found: The visits.
+        effective: What each is made with, by identity, see `_effective`.
+    """
     for v in found:
-        modes, _ = _effective(machine, v)
+        modes, _ = effective[id(v)]
         if modes.orientation not in TURNING and v.motion != Motion.JOINT:
             lost = modes.tool.why or modes.base.why or _MAY_NOT_TURN
             why = v.goal.why or _NOT_TURNED.get(modes.orientation, lost)

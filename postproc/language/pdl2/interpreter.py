@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from postproc.diagnostics import Code, Reason
+from postproc.files import base_name
 from postproc.language import ir
 from postproc.language.analysis.call_context import CALLED, HANDLED, At, Context
 from postproc.language.analysis.interpreter import MOST_STEPS, NOT_UNROLLED
 from postproc.language.analysis.origins import NOWHERE
+from postproc.language.analysis.shared_changes import OutsideCall, describe_call
 from postproc.language.language import JobReading, Start
 from postproc.language.pdl2 import calls, values
 from postproc.language.pdl2 import syntax as ast
@@ -30,6 +32,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.move_blocks import MoveBlocks
 from postproc.language.pdl2.moves import move
+from postproc.language.pdl2.other_programs import find_calls
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.side_effects import (
     CallGraph,
@@ -370,19 +373,51 @@ def _start(machine: Machine) -> None:
         store.set(gen_ovr=start.override)
     machine.given, machine.lost = store.given, store.lost
     _handlers(machine, store)
+    outside = find_calls(program, world.beside)
     if program.main is not None:
         machine.root.place = world.place(program, program.main)
+        for name in {program.name, base_name(program.lines.source.name)}:
+            if call := outside.get(f"{name}/"):
+                why = describe_call(call)
+                world.report_once(program, 0, Code.CALLED_BY_OTHERS, "", why)
+                store.forget_surroundings(why)
         machine.enter(At(machine.root, program.main.first + 1), store)
+    _begin_anywhere(machine, outside, store)
+
+
+def _begin_anywhere(
+    machine: Machine, outside: Mapping[str, OutsideCall], store: Store
+) -> None:
+    """Begin the routines that other programs call, wherever these are then."""
+    world = machine.world
+    for program in world.programs():
+        names = {program.name, base_name(program.lines.source.name)}
+        for name, body in program.routines.items():
+            found = (outside.get(f"{one}/{name}") for one in names)
+            if call := next(filter(None, found), None):
+                why, place = describe_call(call), world.place(program, body)
+                code = Code.CALLED_BY_OTHERS
+                world.report_once(program, body.first, code, name, why)
+                unknown = _nothing_known(world, store, why)
+                at = place.offset + body.first
+                context = machine.root.within(at, HANDLED, place)
+                machine.enter(At(context, body.first + 1), unknown)
+
+
+def _nothing_known(world: World, store: Store, why: str) -> Store:
+    """Return what is known where anything may have run before."""
+    nothing = values.Nothing(why)
+    unknown = Store(lambda key: nothing, last=NOWHERE)
+    unknown.changing = world.changing
+    unknown.given, unknown.lost = store.given, store.lost
+    unknown.forget_frames(why)
+    return unknown
 
 
 def _handlers(machine: Machine, store: Store) -> None:
     """Condition handlers run at any time: nothing they change is ever known."""
     world = machine.world
-    nothing = values.Nothing("a condition handler runs at any time")
-    unknown = Store(lambda key: nothing, last=NOWHERE)
-    unknown.changing = world.changing
-    unknown.given, unknown.lost = store.given, store.lost
-    unknown.forget_frames(nothing.why)
+    unknown = _nothing_known(world, store, "a condition handler runs at any time")
     for place in world.places():
         for first, last in place.flow.conditions:
             reach = live_rows(world, place, first, last)

@@ -15,7 +15,7 @@ from postproc.language.language import Cloner, JobReading, Language, Start
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.nested import name_parts
-from postproc.language.pdl2.other_programs import changing_programs
+from postproc.language.pdl2.other_programs import find_other_programs
 from postproc.language.pdl2.pose_encoding import PDL2_DIALECT
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
@@ -111,8 +111,8 @@ class Pdl2(Language):
         return super().target_names(file, lines, wanted)
 
     def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
-        """Return other programs that change variables which a program exports."""
-        return changing_programs(program, listing)
+        """Return other programs that change or call what a program exports."""
+        return find_other_programs(program, listing)
 
     def prepare(self) -> None:
         """Load the parsers of programs and variable files."""

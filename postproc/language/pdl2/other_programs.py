@@ -1,15 +1,18 @@
-"""Other programs of a folder that change variables which a program exports."""
+"""Other programs of a folder that change or call what a program exports."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, base_name, read_if_readable
-from postproc.language.analysis.shared_changes import SharedChange
+from postproc.language.analysis.shared_changes import OutsideCall, SharedChange
+from postproc.language.file_name import list_led
+from postproc.language.outputs import HEAD, is_beside_source, version_of
 from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.side_effects import rows_effects
@@ -19,75 +22,123 @@ from postproc.language.text.source import (
     parse_shared,
     source_from_bytes,
 )
-from postproc.language.text.stamp import read_stamp
 
 READ_BEFORE = 8192  # programs of which is known what they change
 
 
-def changing_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]:
-    """Return other programs beside one that change variables which it exports.
+@dataclass(frozen=True)
+class OutsideActs:
+    """What a program does to others.
 
-    Outputs do not count, nor does what only the word IMPORT makes known.
+    Attributes:
+        changes: Exported variables of others that it may change, by their keys, with
+            the first lines.
+        calls: Likewise programs (``program/``) and routines (``program/routine``).
     """
-    changing = listing.beside(program, _find_changing)
-    return tuple(changing.get(base_name(program.name), ()))
+
+    changes: Mapping[str, int]
+    calls: Mapping[str, int]
+
+    @property
+    def programs(self) -> frozenset[str]:
+        """The programs that are concerned."""
+        every = (*self.changes, *self.calls)
+        return frozenset(key.partition("/")[0] for key in every)
 
 
-def _find_changing(
+NOTHING = OutsideActs({}, {})
+
+
+def find_other_programs(program: Path, listing: FolderListing) -> tuple[Path, ...]:
+    """Return other programs beside one that change or call what it, or a page, holds.
+
+    Outputs beside their sources do not count.
+    """
+    found = listing.beside(program, _find_acting)
+    if not found:
+        return ()
+    led, own = list_led(Pdl2FileName(str(program)), listing), base_name(program.name)
+    concerned = (p for one in led for p in found.get(base_name(one.name), ()))
+    others = (one for one in concerned if base_name(one.name) != own)
+    return tuple(dict.fromkeys(others))
+
+
+def _find_acting(
     folder: Path, listing: FolderListing, but: str
 ) -> Mapping[str, Sequence[Path]]:
-    """Find the programs of a folder that change what others export, by these."""
+    """Find the programs of a folder that change or call others, by these."""
     found = defaultdict[str, list[Path]](list)
     for one in listing.ending(folder, Pdl2FileName.programs):
-        if one.name.lower() != but:
-            exporters = _list_exporters(one, *_version(one))
-            for exporter in exporters - {base_name(one.name)}:
-                found[exporter].append(one)
+        if one.name.lower() != but and not is_beside_source(one, listing):
+            for name in _read_acts(one, *version_of(one)).programs:
+                found[name].append(one)
     return found
 
 
-def _version(path: Path) -> tuple[int, int]:
-    """Return what tells a file from what it was before."""
-    status = path.stat()
-    return status.st_mtime_ns, status.st_size
-
-
 @lru_cache(READ_BEFORE)
-def _list_exporters(path: Path, changed: int, size: int) -> frozenset[str]:
-    """Return the programs whose variables a program may change."""
+def _read_acts(path: Path, changed: int, size: int) -> OutsideActs:
+    """Return what a program may do to others, as it is now."""
     data = read_if_readable(path)
-    if b"exported" not in data.lower() or read_stamp(data) is not None:
-        return frozenset()
+    text = data.lower()
+    if not any(word in text for word in (b"exported", b"call", b"import")):
+        return NOTHING
     try:
-        changes = _list_changes(source_from_bytes(path.name, data))
+        return _list_acts(source_from_bytes(path.name, data))
     except ProgramError:
-        return frozenset()
-    return frozenset(key.partition("/")[0] for key in changes)
+        return NOTHING
 
 
 def find_changes(others: Sequence[Program]) -> Mapping[str, Sequence[SharedChange]]:
     """Find what other programs change of exported variables, by their keys."""
     found = defaultdict[str, list[SharedChange]](list)
-    for other in others:
-        for key, line in _list_changes(other.lines.source).items():
-            change = SharedChange(key, (), other.lines.source.name, line)
-            found[key].append(change)
+    for source in (one.lines.source for one in others):
+        for key, line in _list_acts(source).changes.items():
+            found[key].append(SharedChange(key, (), source.name, line))
     return dict(found)
 
 
+def find_calls(main: Program, others: Sequence[Program]) -> Mapping[str, OutsideCall]:
+    """Find what other programs of the arm of a program call, by its keys."""
+    found, arm = dict[str, OutsideCall](), _arm_of(main.lines.source)
+    sources = (one.lines.source for one in others)
+    for source in (one for one in sources if arm in (0, _arm_of(one) or 1)):
+        for key, line in _list_acts(source).calls.items():
+            name = key.strip("/").rpartition("/")[2]
+            found.setdefault(key, OutsideCall(name, source.name, line))
+    return found
+
+
+def _arm_of(source: Source) -> int:
+    """Return the arm that a program says it is for, 0 where it says none."""
+    return Pdl2FileName(source.name).arm(source.data[:HEAD])
+
+
 @lru_cache(KEPT_FILES)
-def _list_changes(source: Source) -> dict[str, int]:
-    """Return the exported variables that a program may change, and the first lines."""
+def _list_acts(source: Source) -> OutsideActs:
+    """Return what a program may do to others."""
     program = parse_shared(parse, source)
-    variables = program.variables
+    variables, whole = program.variables, rows_effects(program, 0, len(program.lines))
     exported = {
         name: f"{variables[name].exported}/{name}"
         for name in variables.which(lambda said: bool(said.exported))
         if variables[name].exported != program.name
     }
-    rows = range(len(program.lines)) if exported else ()
-    found: dict[str, int] = {}
+    exported = {n: key for n, key in exported.items() if n in whole.assigned}
+    called = {name: _keys_of(program, name) for name in whole.calls}
+    changes, calls = dict[str, int](), dict[str, int]()
+    rows = range(len(program.lines)) if exported or any(called.values()) else ()
     for row in rows:
-        for name in rows_effects(program, row, row + 1).assigned & exported.keys():
-            found.setdefault(exported[name], program.lines.line(row))
-    return found
+        own, line = rows_effects(program, row, row + 1), program.lines.line(row)
+        for name in own.assigned & exported.keys():
+            changes.setdefault(exported[name], line)
+        for name in own.calls & called.keys():
+            for key in called.pop(name):
+                calls[key] = line
+    return OutsideActs(changes, calls)
+
+
+def _keys_of(program: Program, name: str) -> list[str]:
+    """Name what a call may mean: a program, or a routine that others export."""
+    exporter = program.outside.get(name)
+    holders = [exporter] if exporter else [*map(base_name, program.imports)]
+    return [f"{name}/", *(f"{holder}/{name}" for holder in holders)]

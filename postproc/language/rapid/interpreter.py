@@ -143,6 +143,20 @@ class RapidMachine(TaskMachine):
         alone = self._exits_of(context) or self.task.find_calls & {*SYNCHRONOUS}
         return super().reads_at_once(context) and not alone
 
+    def is_setting(self, one: ir.SourceStatement) -> bool:
+        """Return True for instructions that move nothing, and that set modes alone.
+
+        The arm does not wait for them; they call nothing, and give no data a value
+        that is followed.
+        """
+        if not isinstance(one, ir.Instruction) or one.name in self.task.routines:
+            return False
+        known = read_known_instructions().get(one.name) in ("still", "modal")
+        waits = one.name in WAITING or one.name in STOPPED
+        if not known or waits or self.declares_motionless(one.name):
+            return False
+        return not (as_assignment(one, ()) or ir.calls_in(one))
+
     def at_call(self, context: Context, here: Arrived) -> Arrived:
         """Leave a routine whose error handler moves."""
         return here.blocking(_HANDLER) if self._handlers_of(context).moves else here

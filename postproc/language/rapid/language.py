@@ -13,7 +13,7 @@ from postproc.language.rapid import backup
 from postproc.language.rapid.clones import RapidCloner
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.interpreter import RapidMachine
-from postproc.language.rapid.other_modules import changing_modules
+from postproc.language.rapid.other_modules import find_other_modules
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.symbols import RapidTask
@@ -58,9 +58,9 @@ class Rapid(TaskLanguage):
         return RapidFileName(source.name).is_apart
 
     def reads(self, program: Path, listing: FolderListing) -> tuple[Path, ...]:
-        """Return system modules, those of other tasks, and what changes shared data."""
+        """Return system modules, those of other tasks, and what names shared data."""
         own = backup.system_modules(program, listing)
-        others = changing_modules(program, listing)
+        others = find_other_modules(program, listing)
         return (*own, *backup.modules_beside(program, listing), *others)
 
     read_archive = staticmethod(backup.read_backup)

@@ -101,6 +101,7 @@ class RapidGoal(goals.GoalReader):
     task: RapidTask
     dialect = RAPID_DIALECT
     brackets = "{}"
+    places = ("trans.x", "trans.y", "trans.z")
     system = "it stands in a system module, which is read and not rewritten"
 
     # Moves.
@@ -323,7 +324,9 @@ class RapidGoal(goals.GoalReader):
     def explain_unknown(self, name: str) -> Reason:
         """Say why a name stands for no known point."""
         found, code = self.task.datum(name, self.here), Code.RUNTIME_VALUE
-        if found is None:
+        if name in self.here.parameters:
+            text = f"is a parameter: {goals.RUN_TIME} which point it stands for"
+        elif found is None:
             code = Code.UNDECLARED_VARIABLE
             text = "is declared in none of the given files, or more than once"
         elif found[1].value is None and name not in self.task.written:

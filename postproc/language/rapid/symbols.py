@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -45,6 +46,11 @@ from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.shifts import Shift, ShiftKind
 from postproc.language.text.source import KEPT_FILES, Source, parse_shared
 
+_UNREAD = re.compile(rb'"[^"\n]*"|![^\n]*')
+_BLANK = bytes(
+    k if (chr(k).isalnum() and k < 128) or k == 95 else 32 for k in range(256)
+)
+"""Makes blanks of all that words are not made of."""
 SHIFTS = {"offs": ShiftKind.AXES, "reltool": ShiftKind.OWN}
 """Functions whose first argument is a target."""
 
@@ -176,6 +182,18 @@ class RapidTask(TaskSymbols[RapidFile]):
 
     # What other modules do of the same task, or what ran before it.
 
+    def is_exported(self, datum: Datum) -> bool:
+        """Return True for data of all modules that a module beside names."""
+        own = datum.scope == "local" or bool(datum.routine)
+        return not own and datum.name in self._named_elsewhere
+
+    @cached_property
+    def _named_elsewhere(self) -> frozenset[str]:
+        """Names in modules beside that these do not declare."""
+        others = (one for one in self.files_beside if not _task_of(one))
+        names = (list_names(one.text.source) for one in others)
+        return frozenset[str]().union(*names)
+
     @cached_property
     def changed_elsewhere(self) -> Mapping[str, Sequence[SharedChange]]:
         """What other modules change of the data that they share, by name."""
@@ -285,7 +303,21 @@ class RapidTask(TaskSymbols[RapidFile]):
         pairs = {name for name in self.declared if f"o_{name}" in self.declared}
         return frozenset(pairs | {f"o_{name}" for name in pairs})
 
-    # Offs and RelTool.
+    # Positions that are added, Offs and RelTool.
+
+    def operate(self, operator: str, parts: Sequence[Value | None]) -> Value | None:
+        """Add and subtract positions, too."""
+        if operator not in ("+", "-") or len(parts) != 2:
+            return super().operate(operator, parts)
+        both = [part for part in parts if isinstance(part, tuple)]
+        if len(both) < 2 or any(len(part) != 3 for part in both):
+            return super().operate(operator, parts)
+        found = [
+            super(RapidTask, self).operate(operator, two)
+            for two in zip(*both, strict=True)
+        ]
+        known = tuple(one for one in found if one is not None)
+        return known if len(known) == 3 else None
 
     def apply(self, call: ir.FunctionCall, here: Scope, depth: int) -> Value | None:
         """Evaluate Offs and RelTool, too."""
@@ -407,3 +439,16 @@ def list_changes(source: Source) -> tuple[SharedChange, ...]:
     """List what a module changes of others' data, without a name of any of them."""
     task = RapidTask([parse_shared(read_rapid, source)])
     return (*task.changes_by_string, *list_shared_changes(task))
+
+
+@lru_cache(KEPT_FILES)
+def list_names(source: Source) -> frozenset[str]:
+    """List the words of a module that are no names of data which it declares."""
+    file = parse_shared(read_rapid, source)
+    return find_words(source.data) - {one.name for one in file.data if not one.routine}
+
+
+def find_words(text: bytes) -> frozenset[str]:
+    """Find the words of a module, in lower case, but for comments and strings."""
+    words = _UNREAD.sub(b" ", text).translate(_BLANK).lower()
+    return frozenset(words.decode("ascii").split())

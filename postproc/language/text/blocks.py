@@ -19,9 +19,12 @@ from postproc.language.analysis.control_flow import (
     is_structural,
 )
 from postproc.language.analysis.declarations import Datum, TaskFile, list_data
-from postproc.language.text.lexer import NAME_MARK
 from postproc.language.text.statement_table import StatementText
-from postproc.language.text.templates import name_index
+from postproc.language.text.templates import (
+    alike,
+    name_index,
+    number_in_order,
+)
 from postproc.language.visits import Diagnostic
 
 
@@ -70,22 +73,22 @@ class Outline:
         self._find_declared()
 
     def _find_declared(self) -> None:
-        """Find declarations of one name, the only one in them that has a digit.
+        """Find declarations of one name that has a digit.
 
-        What they say is not built: it is that of their form.
+        What they say is built once for all whose other names are the same.
         """
         text, shapes = self.text, self.text.shapes
-        found = dict[int, Datum]()
-        for form, one in enumerate(text.said.said):
-            if isinstance(one, ir.Declaration) and len(one.items) == 1:
-                alone = shapes.texts[form].count(NAME_MARK) == 1
-                if alone and name_index(one.items[0].name) == 0:
-                    (found[form],) = list_data(one, -1, "", "")
-        form_of = text.said.form[text.shape]
-        rows = np.flatnonzero(np.isin(form_of, [*found]))
-        at = shapes.name[shapes.first[text.shape[rows]]].astype(np.int64)
-        own = [found[k] for k in form_of[rows].tolist()]
-        pairs = zip(own, shapes.names.take(at).lower(), strict=True)
+        opens = np.array([*map(_declares_open, text.said.said)], dtype=bool)
+        rows = np.flatnonzero(opens[text.said.form[text.shape]])
+        first, behind = (shapes.first[text.shape[rows] + k] for k in (0, 1))
+        kind = alike(shapes.name, first + 1, behind)  # names but the declared one
+        kind, example = number_in_order(
+            kind * len(opens) + text.said.form[text.shape[rows]]
+        )
+        data = [one for row in rows[example].tolist()
+                for one in list_data(text.statement(row), row, "", "")]  # fmt: skip
+        names = shapes.names.take(shapes.name[first].astype(np.int64)).lower()
+        pairs = zip([data[k] for k in kind.tolist()], names, strict=True)
         self._declared = dict(zip(rows.tolist(), pairs, strict=True))
 
     def _begin_blocks(self) -> None:
@@ -216,3 +219,9 @@ def check_blocks(file: TaskFile) -> None:
         if found.code == Code.OPEN_BLOCK:
             cure = "Close it: what runs when is not known without"
             raise ProgramError(found.file, found.message, cure, line=found.line)
+
+
+def _declares_open(one: ir.SourceStatement) -> bool:
+    """Return True if a statement declares one name that is open, the first in it."""
+    items = one.items if isinstance(one, ir.Declaration) else ()
+    return len(items) == 1 and name_index(items[0].name) == 0

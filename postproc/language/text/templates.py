@@ -49,6 +49,15 @@ def number_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     return _native.number_in_order(np.ascontiguousarray(keys, np.int64), None)
 
 
+def split_by(values: AnyInts) -> Iterator[tuple[int, Ints]]:
+    """Yield each of some values, ascending, and where it stands, (m,)."""
+    order = np.argsort(values, kind="stable")
+    ascending = values[order]
+    cuts = np.flatnonzero(np.diff(ascending)) + 1
+    for own in np.split(order, cuts) if len(order) else ():
+        yield int(values[own[0]]), own
+
+
 # The shapes of the lines of a file: few forms, with many names filled in.
 
 AnyInts = NDArray[np.signedinteger[Any]]
@@ -258,19 +267,18 @@ class ParsedShapes(Generic[T]):
         """Return the form of every shape, as an index into `said`, (k,)."""
         return self.shapes.form
 
-    def distinct(self, shapes: Ints, free: Callable[[T], int]) -> Ints:
-        """Return one of all shapes that differ in a name alone that says nothing.
+    def distinct(self, shapes: Ints, free: Sequence[Sequence[int]]) -> Ints:
+        """Return one of all shapes that differ in names alone that do not count.
 
         Args:
             shapes: Some shapes, (m,).
-            free: Tells which name of a form says nothing, -1 for none.
+            free: Which names of each form do not count.
         """
-        at = np.array([free(one) for one in self.said], dtype=np.int64)
-        forms = self.form[shapes]
-        kept = [shapes[at[forms] < 0]]
-        for form in np.flatnonzero(np.bincount(forms, minlength=len(at)) * (at >= 0)):
-            own = shapes[forms == form]
-            names = np.delete(self.shapes.names_at(own), at[form], axis=1)
+        some = np.array([*map(bool, free)], dtype=bool)[self.form[shapes]]
+        kept, shapes = [shapes[~some]], shapes[some]
+        for form, at in split_by(self.form[shapes]):
+            own = shapes[at]
+            names = np.delete(self.shapes.names_at(own), [*free[form]], axis=1)
             ends = names.shape[1] * np.arange(1, len(own) + 1)
             kind = alike(names.ravel(), ends - names.shape[1], ends)
             kept.append(own[number_in_order(kind)[1]])

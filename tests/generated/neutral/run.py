@@ -77,7 +77,8 @@ class Target:
     Attributes:
         literals: Whose numbers are in it.
         computed: It is not what a literal says.
-        parted: A number of it has been set by itself: nothing else of it may change.
+        parted: A number of it has been set by itself, otherwise than by adding to it:
+            nothing else of it may change.
     """
 
     value: np.ndarray
@@ -271,8 +272,7 @@ class Run:
             case Lift(name, by):
                 old = self._target(name)
                 value = shifted(old.value, (0, 0, self._number(by)), False)
-                lifted = replace(old, value=value, computed=True, parted=True)
-                self.all[name] = Box(lifted)
+                self.all[name] = Box(replace(old, value=value, computed=True))
             case Wait():
                 self._stop("wait")
             case Output(_, ahead):
@@ -312,7 +312,8 @@ class Run:
             number = float(self._place(one.of).value[one.axis, 3]) + by
         value = old.value.copy()
         value[one.axis, 3] = number
-        new = replace(old, value=value, computed=True, parted=True)
+        parted = old.parted or one.of != one.point
+        new = replace(old, value=value, computed=True, parted=parted)
         match one.point:
             case Named(name):
                 self.all[name] = Box(new)

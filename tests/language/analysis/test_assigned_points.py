@@ -101,3 +101,72 @@ def test_functions_within_functions_cost_what_their_depth_does(monkeypatch):
         task("q:=p1;", move, L.format("q"), more=more)
         counts.append(len(calls))
     assert counts[2] < 5 * counts[1] < 25 * counts[0]
+
+
+# What is added to the place of a point shifts it.
+
+OWN = "VAR robtarget q;\nVAR num n:=7;\n"
+ADDED = {
+    "a component": (["q:=p1;", "q.trans.z:=q.trans.z+7;"], "0,0,n"),
+    "subtracted": (["q:=p1;", "q.trans.z:=q.trans.z-(-7);"], "0,0,n"),
+    "the other way": (["q:=p1;", "q.trans.z:=7+q.trans.z;"], "0,0,n"),
+    "an instruction": (["q:=p1;", "Add q.trans.z,n;"], "0,0,n"),
+    "several": (["q:=p1;", "q.trans.y:=q.trans.y+4+3;", "Add q.trans.x,n;"], "n,7,0"),
+    "a place": (["q:=p1;", "q.trans:=q.trans+[0,3,4];", "Add q.trans.z,3;"], "0,3,n"),
+    "a shift": (["q:=Offs(p1,1,0,3);", "q.trans.z:=q.trans.z+4;"], "1,0,n"),
+    "a copy": (["q:=p1;", "q.trans.x:=q.trans.x+n;", "q2:=q;", "q:=q2;"], "n,0,0"),
+}
+
+
+def target_of(found, k=1):
+    """Return where a visit goes, what it moves along with, and why, and so on."""
+    v, t = found.visits, found.visits.target
+    place = np.round(t.values[k], 9).tolist()
+    pinned = v.literals.pinned[t.literal[0]]
+    return place, t.follows[k], t.literal[k], v.reasons[v.reason[k]], pinned
+
+
+@pytest.mark.parametrize("way", ADDED)
+def test_what_is_added_to_a_place_shifts_a_point(way):
+    lines, by = ADDED[way]
+    more = f"{OWN}VAR robtarget q2;\n"
+    move = ["n:=7;", L.format("p1")]
+    found = task(*move, *lines, L.format("q"), more=more)
+    shifted = task(*move, L.format(f"Offs(p1,{by})"), more=more)
+    assert target_of(found) == target_of(shifted)
+    assert found.visits.target.follows[1] == found.visits.target.literal[0] >= 0
+
+
+def test_what_is_added_to_a_place_in_krl_shifts_a_point():
+    found = job("DECL E6POS Q", "LIN XP1", "Q=XP1", "Q.Z=Q.Z+(7)", "LIN Q")
+    start = job("LIN XP1").visits.target.values[0]
+    place, follows, literal, why, pinned = target_of(found)
+    assert place == [*start[:2], start[2] + 7, *start[3:]]
+    assert (follows, literal, why.text, pinned) == (0, -1, "", "")
+
+
+KEEPS = {
+    "set": ["q.trans.z:=7;"],
+    "set before": ["q.trans.z:=7;", "q.trans.z:=q.trans.z+1;"],
+    "twice itself": ["q.trans.z:=q.trans.z+q.trans.z;"],
+    "another component": ["q.trans.z:=q.trans.z+q.trans.x;"],
+    "turned": ["q.trans.z:=q.trans.z+1;", "q.rot.q1:=q.rot.q1+0.1;"],
+    "reversed": ["q.trans.z:=7-q.trans.z;"],
+    "another point": ["q.trans.z:=p1.trans.z+7;"],
+    "not known": ["q.trans.z:=q.trans.z+DInput(di1);"],
+    "read": ["q.trans.z:=q.trans.z+1;", "n:=q.trans.z;"],
+    "one way of two": ["IF di1=1 THEN", "q.trans.z:=q.trans.z+1;", "ENDIF"],
+    "each round": ["WHILE di1=1 DO", "q.trans.z:=q.trans.z+1;", "ENDWHILE"],
+    "two ways": ["IF di1=1 THEN", "q.trans.z:=10;", "ELSE", "q.trans.z:=3;",
+                 "q.trans.z:=q.trans.z+7;", "ENDIF"],
+    "alike on two ways": ["IF di1=1 THEN", "q.trans.z:=10;", "ELSE",
+                          "q.trans.z:=q.trans.z+7;", "ENDIF"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", KEEPS)
+def test_what_is_no_sure_shift_keeps_the_numbers_of_a_point(way):
+    found = task(L.format("p1"), "q:=p1;", *KEEPS[way], L.format("q"), more=OWN)
+    *_, why, pinned = target_of(found)
+    assert pinned
+    assert why or way == "read"

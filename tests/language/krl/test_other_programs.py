@@ -7,7 +7,7 @@ import pytest
 from postproc.compensation.program_files import find_pages
 from postproc.files import FolderListing
 from postproc.language.krl.language import Krl
-from postproc.language.krl.other_programs import changing_programs
+from postproc.language.krl.other_programs import find_other_programs
 from postproc.language.language import Start
 from postproc.language.text.source import Source
 from tests.language.krl.test_visits import CONFIG, DATA, reasons
@@ -73,6 +73,12 @@ def test_an_index_that_is_not_known_may_be_any():
     assert reasons(found) != [""]
 
 
+def test_the_change_of_the_element_is_named():
+    other = "BASE_DATA[4].X=1\nBASE_DATA[2].X=1"
+    (why,) = reasons(read(FRAMES, other))
+    assert "o.src (line 3)" in why
+
+
 def test_what_a_program_sets_by_itself_is_known():
     assert reasons(read(SET + FRAMES, "BASE_DATA[2].X=5")) == [""]
 
@@ -123,7 +129,7 @@ def test_programs_that_are_read(tmp_path, files, expected, folder):
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    found = changing_programs(tmp_path / "Program/m.src", FolderListing())
+    found = find_other_programs(tmp_path / "Program/m.src", FolderListing())
     assert [path.name for path in found] == expected
 
 

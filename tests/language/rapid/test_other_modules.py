@@ -7,9 +7,11 @@ import pytest
 from postproc.files import FolderListing
 from postproc.language.language import Start
 from postproc.language.rapid.language import Rapid
-from postproc.language.rapid.other_modules import changing_modules
+from postproc.language.rapid.other_modules import find_other_modules
 from postproc.language.text.source import Source
+from postproc.language.text.stamp import stamp_line
 from tests.golden.rapid_cases import DATA, go, module
+from tests.language.rapid.test_system_modules import compensated, folder  # noqa: F401
 
 POINT = next(line for line in DATA if "robtarget p1:" in line)
 TOOL = next(line for line in DATA if "tooldata t:" in line)
@@ -83,10 +85,34 @@ def test_what_a_program_sets_by_itself_is_known():
     assert reasons([f"w:={whole}", go("p1")], f"w.uframe:={FRAME};") == [""]
 
 
+@pytest.mark.parametrize(
+    ("body", "declared", "shared"),
+    [
+        ("MoveL p1,v5,fine,t;", "", True),
+        ("w2.uframe:=DefFrame(p1,p2,p3);", "", True),
+        ("MoveL p1,v5,fine,t;", shared(POINT), False),
+        ("MoveL p2,v5,fine,t;", "", False),
+        ('TPWrite "p1"; ! p1', "", False),
+    ],
+)
+def test_points_that_another_module_names_are_shared(body, declared, shared):
+    sources = [Source("job.mod", module(go("p1"), go("Offs(p1,0,0,9)")))]
+    sources.append(Source("MODULES/o.mod", other(body, declared).encode()))
+    literals = Rapid().read(sources, Start()).visits.literals
+    assert literals.shared.any() == shared
+
+
+def test_points_of_a_module_alone_are_its_own():
+    sources = [Source("job.mod", module(go("p1")).replace(b"CONST", b"LOCAL CONST"))]
+    sources.append(Source("MODULES/o.mod", other("MoveL p1,v5,fine,t;").encode()))
+    assert not Rapid().read(sources, Start()).visits.literals.shared.any()
+
+
 OTHERS = {
     "frame": (f"w.uframe:={FRAME};", "", True),
     "by text": ("SetDataVal name,w;", "", True),
-    "read": ("MoveL p1,v5,fine,t\\WObj:=w;", "", False),
+    "read": ("MoveL p1,v5,fine,t\\WObj:=w;", "", True),
+    "comment": ("! w of b.mod", "", False),
     "its own": (f"w.uframe:={FRAME};", shared(WOBJ), False),
     "none": ("x:=1;", "VAR num x;", False),
     "no module": ("ENDIF", "", False),
@@ -98,5 +124,13 @@ def test_modules_that_are_read(tmp_path, body, declared, expected):
     own = module(go("p1")).decode().replace(WOBJ, shared(WOBJ))
     (tmp_path / "job.mod").write_text(own)
     (tmp_path / "o.mod").write_text(other(body, declared))
-    found = changing_modules(tmp_path / "job.mod", FolderListing())
+    found = find_other_modules(tmp_path / "job.mod", FolderListing())
     assert [path.name for path in found] == ["o.mod"] * expected
+
+
+def test_a_compensated_module_beside_counts(folder):  # noqa: F811
+    text = other(f"w.uframe:={FRAME};")
+    stamp = stamp_line("0", "m", Source("o.mod", text.encode()), "!").decode()
+    own = module(go("p1")).decode().replace(WOBJ, shared(WOBJ))
+    found = compensated(folder, {"job.mod": own, "o.mod": stamp + text})
+    assert found.exit_code == 1 and "w may be changed by o.mod" in found.stderr

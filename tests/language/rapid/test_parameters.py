@@ -235,6 +235,17 @@ def test_points_of_an_array_that_a_routine_gets_keep_their_numbers(kind):
     assert free(alone, "list{1}")
 
 
+@pytest.mark.parametrize(
+    ("goal", "text"),
+    [("p{1}", "an element of an array that its routine is called with"),
+     ("p{n}", "p is a parameter"), ("p{4}", "p is a parameter")],
+)  # fmt: skip
+def test_the_reason_names_the_parameter_that_is_an_array(goal, text):
+    more = MORE + routine("go", L.format(goal), given="(robtarget p{*})")
+    (reason,) = reasons(once("go list;", more=more))
+    assert text in reason and "declared" not in reason and "other data" not in reason
+
+
 # Options and arguments that answer.
 
 ANSWERS = {
