@@ -32,6 +32,7 @@ from postproc.compensation.eligibility.unchanged import HOLDS_NONE
 from postproc.compensation.options import DEFAULT_OPTIONS, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
+from postproc.diagnostics import Code
 from postproc.exceptions import PostprocError
 from postproc.language.languages import languages
 from postproc.language.visits import NOT_FOLLOWED
@@ -257,7 +258,8 @@ class Misses:
     """How far an arm lands from where a job asks it to be, at corrected stops.
 
     Attributes:
-        sure: Where the sides of all joints are known, (n,) [mm].
+        sure: Where the sides of all joints are known, and the correction is that of
+            the arrival alone, (n,) [mm].
         other: At the other stops, (m,) [mm].
         before: At all of them without a correction, (n + m,) [mm].
     """
@@ -292,7 +294,8 @@ def _landed(outcome: Outcome, cell: Cell) -> Misses:
     v, d, rows = outcome.visits, outcome.decisions, after.visit
     stops = (d.status == Status.CORRECTED) & ~v.motion.fly & ~v.motion.via
     stops[:1] = False  # how the gears lie at first is not known
-    sure = stops & (d.direction != 0).all(axis=1)
+    averaged = [one.code is Code.ARRIVALS_AVERAGED for one in d.reasons]
+    sure = stops & (d.direction != 0).all(axis=1) & ~np.array(averaged)[d.why]
     was, miss = (1e3 * np.linalg.norm(x.error, axis=1) for x in (before, after))
     return Misses(
         miss[sure[rows]], miss[(stops & ~sure)[rows]], was[stops[before.visit]]
