@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from postproc.language.language import Start
+from postproc.language.pdl2.language import Pdl2
 from postproc.language.text.grammars import grammar
+from postproc.language.text.source import Source
 from postproc.language.visits import ELSEWHERE, ZoneRule
 from tests.language.pdl2.test_external_routines import (
     FIRST,
@@ -16,6 +19,7 @@ from tests.language.pdl2.test_external_routines import (
     reasons,
     routine,
 )
+from tests.language.pdl2.test_opaque_calls import program
 
 PAGE = Path(__file__).parents[3] / "docs" / "pdl2.md"
 AHEAD = "MOVE LINEAR TO POS(110, 400, 150, 0, 175, 0, '') ADVANCE"
@@ -93,6 +97,7 @@ CHECKS = {
     "`READ`, `DECODE`": lambda: left("READ (n)", "MOVE LINEAR TO POS(n, 2, 3, 0, 180, "
                                      "0, '')", head=["VAR n : INTEGER"]),
     "exported variables": lambda: left("MOVE LINEAR TO p", head=VARS),
+    "`CALL` of the program by another": lambda: all(called_by_another()),
 }  # fmt: skip
 # Words of statements that can do nothing of the table, and words inside of statements.
 HARMLESS = """
@@ -105,6 +110,15 @@ INNER = """
     ENDCONDITION IN BY TO VIA AWAY NEAR ABOUT ALONG RELATIVE ADVANCE WITH SYNCMOVEFLY
     ENDMOVE FILE ENDOPEN SEGMENT
 """.split()
+
+
+def called_by_another():
+    """Return why moves stay of a program that another one calls."""
+    texts = {"job.pdl": program("job", [], [LAST]),
+             "PROGRAMS/o.pdl": program("o", [], ["CALL job"])}  # fmt: skip
+    sources = [Source(name, text.encode()) for name, text in texts.items()]
+    v = Pdl2().read(sources, Start()).visits
+    return [v.reasons[k].text for k in v.reason.tolist()]
 
 
 def rows():
