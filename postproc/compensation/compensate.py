@@ -121,7 +121,8 @@ def compensate(
         load()
     outcome = compensate_files(given, cell, model, options, progress, processes)
     told = (*outcome.diagnostics, *given.report_omissions(cell))
-    outcome = replace(outcome, diagnostics=told, inputs=given.inputs)
+    record = replace(outcome.record, read=given.digests)
+    outcome = replace(outcome, diagnostics=told, inputs=given.inputs, record=record)
     if not judged:
         return outcome
     from postproc.compensation.findings.second_opinion import second_opinion
