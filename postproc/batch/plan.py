@@ -164,7 +164,8 @@ class BatchPlan:
 
         Args:
             program: Its path below the source tree, with ``/``.
-            arm: ``PROG_ARM``, 0 where it is not said: the program is one of arm 1.
+            arm: That of the program (``PROG_ARM``, or its task's in a backup), 0 where
+                it is not said: the program is one of arm 1; -1: nobody can tell.
         """
         rules = zip(self.patterns, self.arms, self.which, strict=True)
         for pattern, wanted, index in rules:

@@ -63,7 +63,7 @@ from postproc.compensation.window_result import CompensatedProgram, WindowResult
 from postproc.diagnostics import Code
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.language import Language
-from postproc.language.languages import UNNAMED, language_of
+from postproc.language.languages import UNNAMED, file_named, language_of
 from postproc.language.text.source import Source
 from postproc.language.text.stamp import is_stamped
 from postproc.language.visits import Diagnostic, Visits, deduplicate
@@ -147,6 +147,9 @@ def compensate_files(
         PostprocError: As there.
     """
     files = given.by_name
+    if given.path is not None:
+        file = file_named(given.path)
+        file.refuse_other_arm(cell.arm_number, str(cell.path))
     check_preconditions(files, cell, model)
     cell = prepare_cell(cell, model, options)
     setting = Job(cell, model, options, Clock(progress), processes)
