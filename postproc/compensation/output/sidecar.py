@@ -28,6 +28,7 @@ T = TypeVar("T")
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
 CURE = "Restore needs the record that was written beside the program"
+EDITED = "was edited after it was compensated: overwritten. Edit its source instead"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
 
 
@@ -240,6 +241,23 @@ def read_without_edits(path: Path) -> Sidecar:
         ProgramError: It is missing, or not a record.
     """
     return _record(path, _without_edits(read_input(path, CURE)))
+
+
+def list_edited(record: Path) -> list[Path]:
+    """Return the outputs beside a record that were changed since they were written.
+
+    Those that were restored are not among them. Nothing where there is no record, or
+    none that can be read.
+    """
+    try:
+        told = read_without_edits(record)
+    except ProgramError:
+        return []
+    own = record.name.removesuffix(SUFFIX)
+    ours = {name: {digest} for name, digest in told.read.items() if name == own}
+    ours |= {n: {f.source_sha256, f.output_sha256} for n, f in told.files.items()}
+    found = ((record.with_name(name), digests) for name, digests in ours.items())
+    return [p for p, digests in found if p.is_file() and file_sha256(p) not in digests]
 
 
 def _without_edits(text: bytes) -> bytes:
