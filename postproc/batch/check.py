@@ -19,6 +19,7 @@ from postproc.compensation.output.sidecar import (
     FileRecord,
     LeftLine,
     Sidecar,
+    path_between,
     read_sidecar,
     read_without_edits,
     sha256,
@@ -29,10 +30,11 @@ from postproc.diagnostics import Code
 from postproc.exceptions import PostprocError, ProgramError
 from postproc.files import (
     TEMPORARY,
+    FolderListing,
     read_input,
     schema,
 )
-from postproc.language.languages import file_named
+from postproc.language.languages import file_named, language_of
 from postproc.language.text.stamp import Stamp, read_stamp
 from postproc.language.visits import line_ranges
 from postproc.model.model import Model, load_model
@@ -196,7 +198,8 @@ def check_tree(
             raise ProgramError(root, "is no folder", "Give a tree of programs")
     places = list(_places(folder))
     names = {place.lower(): place for place in places}
-    look = _Look(folder, source, current, names, assume_motion)
+    listing = FolderListing(None if source is None else source.absolute())
+    look = _Look(folder, source, current, names, assume_motion, listing=listing)
     findings = [f for place in places for f in look.at(place)]
     findings += _find_mixed_models(
         folder, [place for place in places if current(place) is None]
@@ -292,6 +295,7 @@ class _Look:
         places: All files, by their paths in lower case.
         assume_motion: No routine is motionless because the shipped list says so.
         digests: Digests of what programs read.
+        listing: What the folders of the source tree hold.
     """
 
     root: Path
@@ -300,6 +304,7 @@ class _Look:
     places: Mapping[str, str]
     assume_motion: bool = False
     digests: _Digests = field(default_factory=lambda: _Digests({}, {}))
+    listing: FolderListing = field(default_factory=FolderListing)
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
@@ -361,6 +366,7 @@ class _Look:
         if values := self._existing(file_named(place).variables):
             yield from self._content(values, read_input(self.root / values), sidecar)
         yield from self._read(place, sidecar)
+        yield from self._new(place, sidecar)
 
     def _model(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
         """Check that a program was made with the model it should be made with."""
@@ -434,6 +440,21 @@ class _Look:
             elif self._origin_of(path) not in (None, digest):
                 text = f"{name}, which its job reads, was changed in this tree since"
                 yield CheckFinding(place, Code.CHANGED, f"{text}: {_UNDO}")
+
+    def _new(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+        """Find what a program would read of its sources now, and was not read with."""
+        name = posixpath.basename(place)
+        if self.source is None or next(iter(sidecar.read), "") != name:
+            return  # a page of another program, or an older record
+        root = self.source.absolute()
+        if not (root / place).is_file():
+            return
+        for path in language_of(name).reads(root / place, self.listing):
+            read = path_between((root / place).parent, path)
+            if root in path.parents and read not in sidecar.read:
+                text = f"{read} of the source tree changes now what its job reads"
+                text = f"{text}: compensate it again"
+                yield CheckFinding(place, Code.SOURCE_CHANGED, text)
 
     def _source_of(self, path: str) -> str | None:
         """Return the digest of a file of the source tree, "" where it is not there.

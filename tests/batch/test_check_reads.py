@@ -98,6 +98,20 @@ def test_a_read_file_that_is_gone_from_the_sources_is_found(trees):
     assert found_in(check(target, source=source)) == expected
 
 
+def test_a_program_that_changes_what_a_job_reads_since_then_is_found(trees):
+    source, target = trees
+    text = (source / SETS).read_bytes().replace(b"sets", b"more")
+    (source / SETS).with_name("more.src").write_bytes(text)
+    found = check(target, source=source)
+    expected = {(f"{JOB}.src", "source-changed"), (SETS, "source-changed")}
+    absent = {(SETS.replace("sets", "more"), "absent")}
+    assert found_in(found) == expected | absent
+    assert any(
+        "more.src of the source tree changes" in f.message for f in found.findings
+    )
+    assert found_in(check(target)) == set()
+
+
 def test_a_page_of_another_source_than_the_program_was_read_with_is_found(trees):
     source, target = trees
     touch(source / f"{JOB}.dat")
