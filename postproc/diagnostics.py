@@ -789,8 +789,8 @@ class Code(StrEnum):
     CHANGED = (
         "changed",
         ERROR,
-        "The file was changed after it was compensated.",
-        "Change the source, and compensate it again.",
+        "The file, or one that its job reads, was changed after it was compensated.",
+        "Make the change in the source, and compensate that again.",
     )
     NO_RECORD = (
         "no-record",
@@ -820,7 +820,7 @@ class Code(StrEnum):
     SOURCE_CHANGED = (
         "source-changed",
         ERROR,
-        "The source was changed after the file was made from it.",
+        "The source, or another file that it was compensated with, was changed since.",
         "Compensate it again.",
     )
     NO_SOURCE = (

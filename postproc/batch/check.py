@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import posixpath
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,9 @@ from postproc.compensation.output.sidecar import (
     FileRecord,
     LeftLine,
     Sidecar,
+    path_between,
     read_sidecar,
+    read_without_edits,
     sha256,
     sidecar_path,
 )
@@ -27,10 +30,11 @@ from postproc.diagnostics import Code
 from postproc.exceptions import PostprocError, ProgramError
 from postproc.files import (
     TEMPORARY,
+    FolderListing,
     read_input,
     schema,
 )
-from postproc.language.languages import file_named
+from postproc.language.languages import file_named, language_of
 from postproc.language.text.stamp import Stamp, read_stamp
 from postproc.language.visits import line_ranges
 from postproc.model.model import Model, load_model
@@ -38,6 +42,17 @@ from postproc.robot.cell import load_cell
 
 if TYPE_CHECKING:
     from postproc.arrays import DataFrame
+
+_EDITED = (
+    "was changed after it was compensated: make the change in its source, and "
+    "compensate that again"
+)
+_UNDO = "undo that, or make the change in the source tree and compensate it again"
+_SOURCE_CHANGED = "its source has changed since: compensate it again"
+_EITHER_CHANGED = (
+    "differs from its source, and its record does not tell which of them was changed: "
+    "compare them, then compensate the source again"
+)
 
 Current = Callable[[str], str | None]  # program -> id of the model it should have
 
@@ -183,7 +198,8 @@ def check_tree(
             raise ProgramError(root, "is no folder", "Give a tree of programs")
     places = list(_places(folder))
     names = {place.lower(): place for place in places}
-    look = _Look(folder, source, current, names, assume_motion)
+    listing = FolderListing(None if source is None else source.absolute())
+    look = _Look(folder, source, current, names, assume_motion, listing=listing)
     findings = [f for place in places for f in look.at(place)]
     findings += _find_mixed_models(
         folder, [place for place in places if current(place) is None]
@@ -241,6 +257,34 @@ def _absent(source: Path, places: set[str]) -> list[CheckFinding]:
 
 
 @dataclass(frozen=True)
+class _Digests:
+    """Digests of files that many programs read, each found once.
+
+    Attributes:
+        files: Of files, "" where they are not there.
+        sources: Of what outputs were made from.
+    """
+
+    files: dict[Path, str]
+    sources: dict[Path, str]
+
+    def of(self, path: Path) -> str:
+        """Return the digest of a file, "" where it is not there."""
+        if path not in self.files:
+            self.files[path] = sha256(read_input(path)) if path.is_file() else ""
+        return self.files[path]
+
+    def of_source(self, path: Path) -> str:
+        """Return the digest of the source of an output, of another file its own."""
+        if path not in self.sources:
+            record = sidecar_path(path)
+            told = read_without_edits(record) if record.exists() else None
+            source = None if told is None else told.source_of(path.name)
+            self.sources[path] = source or self.of(path)
+        return self.sources[path]
+
+
+@dataclass(frozen=True)
 class _Look:
     """A look at the files of a tree.
 
@@ -250,6 +294,8 @@ class _Look:
         current: Tells the model that a program should be made with.
         places: All files, by their paths in lower case.
         assume_motion: No routine is motionless because the shipped list says so.
+        digests: Digests of what programs read.
+        listing: What the folders of the source tree hold.
     """
 
     root: Path
@@ -257,6 +303,8 @@ class _Look:
     current: Current
     places: Mapping[str, str]
     assume_motion: bool = False
+    digests: _Digests = field(default_factory=lambda: _Digests({}, {}))
+    listing: FolderListing = field(default_factory=FolderListing)
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
@@ -266,8 +314,9 @@ class _Look:
             yield CheckFinding(
                 place, Code.UNFINISHED, "is a temporary file of a run that was killed"
             )
-        elif file.is_program or (file.is_data_list and program):
-            yield from self._program(place)
+        elif file.is_program or (file.is_data_list and (program or self._has(place))):
+            if not file_named(self.root / (program or place)).is_system():
+                yield from self._program(place)
         elif file.is_variables and not program:
             if file.holds_targets(read_input(self.root / place)):
                 yield CheckFinding(
@@ -278,6 +327,10 @@ class _Look:
                 if read_input(self.source / place) == read_input(self.root / place):
                     text = "is compiled from the uncompensated program: translate it "
                     yield CheckFinding(place, Code.UNCOMPENSATED, f"{text}again")
+
+    def _has(self, place: str) -> bool:
+        """Return True if a file has a record."""
+        return sidecar_path(self.root / place).exists()
 
     def _existing(self, place: str) -> str | None:
         """Return the file of a name, whatever its case."""
@@ -312,6 +365,8 @@ class _Look:
         yield from self._content(place, data, sidecar)
         if values := self._existing(file_named(place).variables):
             yield from self._content(values, read_input(self.root / values), sidecar)
+        yield from self._read(place, sidecar)
+        yield from self._new(place, sidecar)
 
     def _model(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
         """Check that a program was made with the model it should be made with."""
@@ -332,12 +387,13 @@ class _Look:
                 text = "is stamped, and its record does not name it"
                 yield CheckFinding(place, Code.NO_RECORD, text)
             yield from _find_uncorrected(place, {}, sidecar.list_uncorrected_in(name))
-            yield from self._source(place, sha256(data))
+            source = sidecar.source_of(name)
+            if stamp is None and source not in (None, sha256(data)):
+                yield CheckFinding(place, Code.CHANGED, _EDITED)
+            yield from self._source(place, source, sha256(data))
             return
         if sha256(data) != record.output_sha256:
-            yield CheckFinding(
-                place, Code.CHANGED, "was changed after it was compensated"
-            )
+            yield CheckFinding(place, Code.CHANGED, _EDITED)
         elif not _is_stamp_right(stamp, record, sidecar):
             yield CheckFinding(
                 place, Code.NO_RECORD, "its stamp is not that of its record"
@@ -345,18 +401,78 @@ class _Look:
         yield from _find_uncorrected(
             place, record.targets, sidecar.list_uncorrected_in(name)
         )
-        yield from self._source(place, record.source_sha256)
+        yield from self._source(place, record.source_sha256, "")
 
-    def _source(self, place: str, digest: str) -> Iterator[CheckFinding]:
-        """Check that a file was made from what is in the source tree now."""
+    def _source(
+        self, place: str, digest: str | None, unedited: str
+    ) -> Iterator[CheckFinding]:
+        """Check that a file was made from what is in the source tree now.
+
+        Args:
+            place: The file.
+            digest: Of its source; None where the record is older, and does not tell.
+            unedited: Its digest, which is its source's unless somebody has edited it.
+        """
         if self.source is None:
             return
         path = self.source / place
         if not path.is_file():
             yield CheckFinding(place, Code.NO_SOURCE, "is not in the source tree")
-        elif sha256(read_input(path)) != digest:
-            text = "its source has changed since: compensate it again"
+        elif sha256(read_input(path)) != (digest or unedited):
+            text = _SOURCE_CHANGED if digest else _EITHER_CHANGED
             yield CheckFinding(place, Code.SOURCE_CHANGED, text)
+
+    def _read(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+        """Check that the other files that a program was read from are as they were."""
+        if sidecar.source_of(posixpath.basename(place)) is None:
+            return  # the record of another program
+        own = (place, self._existing(file_named(place).variables))
+        for name, digest in sidecar.read.items():
+            path = posixpath.normpath(posixpath.join(posixpath.dirname(place), name))
+            if self._existing(path) in own:
+                continue
+            if self._source_of(path) not in (None, digest):
+                text = (
+                    f"{name}, which its job reads, has changed in the source tree since"
+                )
+                text = f"{text}: compensate it again"
+                yield CheckFinding(place, Code.SOURCE_CHANGED, text)
+            elif self._origin_of(path) not in (None, digest):
+                text = f"{name}, which its job reads, was changed in this tree since"
+                yield CheckFinding(place, Code.CHANGED, f"{text}: {_UNDO}")
+
+    def _new(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+        """Find what a program would read of its sources now, and was not read with."""
+        name = posixpath.basename(place)
+        if self.source is None or next(iter(sidecar.read), "") != name:
+            return  # a page of another program, or an older record
+        root = self.source.absolute()
+        if not (root / place).is_file():
+            return
+        for path in language_of(name).reads(root / place, self.listing):
+            read = path_between((root / place).parent, path)
+            if root in path.parents and read not in sidecar.read:
+                text = f"{read} of the source tree changes now what its job reads"
+                text = f"{text}: compensate it again"
+                yield CheckFinding(place, Code.SOURCE_CHANGED, text)
+
+    def _source_of(self, path: str) -> str | None:
+        """Return the digest of a file of the source tree, "" where it is not there.
+
+        None where there is no source tree, or it does not reach there.
+        """
+        if self.source is None:
+            return None
+        found = self.digests.of(self.source / path)
+        return None if path.startswith("../") and not found else found
+
+    def _origin_of(self, path: str) -> str | None:
+        """Return the digest of what a file of the tree was made from.
+
+        Of what is no output that is its own; None where it is not there.
+        """
+        place = self._existing(path)
+        return None if place is None else self.digests.of_source(self.root / place)
 
 
 def _find_missed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:

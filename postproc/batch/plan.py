@@ -8,11 +8,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from postproc import __version__
 from postproc.compensation.options import Options
+from postproc.compensation.output.sidecar import path_between, sha256
 from postproc.exceptions import CellError, PostprocError
 from postproc.files import path_in
 from postproc.model.model import Model, load_model
@@ -163,7 +164,8 @@ class BatchPlan:
 
         Args:
             program: Its path below the source tree, with ``/``.
-            arm: ``PROG_ARM``, 0 where it is not said: the program is one of arm 1.
+            arm: That of the program (``PROG_ARM``, or its task's in a backup), 0 where
+                it is not said: the program is one of arm 1; -1: nobody can tell.
         """
         rules = zip(self.patterns, self.arms, self.which, strict=True)
         for pattern, wanted, index in rules:
@@ -324,6 +326,15 @@ class Task:
     def files(self) -> dict[str, bytes]:
         """Return the bytes of its files by path."""
         return dict(zip(self.unit.files, self.sources, strict=True))
+
+    @property
+    def digests(self) -> dict[str, str]:
+        """Return the SHA-256 of its files by their paths from the program's folder."""
+        folder = PurePosixPath(self.unit.program).parent
+        return {
+            path_between(folder, PurePosixPath(place)): sha256(data)
+            for place, data in self.files.items()
+        }
 
     @property
     def size(self) -> int:

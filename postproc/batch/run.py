@@ -17,7 +17,13 @@ from postproc.batch.journal import Journal, JournalEntry, Summary, read_entries
 from postproc.batch.plan import BatchPlan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
 from postproc.batch.workers import WorkerPool, work_through
-from postproc.compensation.output.sidecar import SUFFIX, file_sha256, sha256
+from postproc.compensation.output.sidecar import (
+    EDITED,
+    SUFFIX,
+    file_sha256,
+    list_edited,
+    sha256,
+)
 from postproc.exceptions import DiskFullError, OutputError
 from postproc.files import (
     TEMPORARY,
@@ -315,7 +321,8 @@ def batch(
             run.work(gather, stop)
             if not stop():
                 run.tidy()
-        run.summary.stopped, run.summary.notes = stop.number, tree.notes
+        run.summary.stopped = stop.number
+        run.summary.notes = (*tree.notes, *run.notes)
         return run.summary
 
 
@@ -340,6 +347,7 @@ class BatchRun:
         self.summary = Summary()
         self.outputs: set[str] = set()  # all that belongs into the target tree
         self.digests: dict[str, str] = {}  # of the programs in work
+        self.notes: list[tuple[str, str]] = []  # what a person should know
         self.total = len(tree.units) + len(tree.copies) + len(tree.refused)
 
     def add(self, entry: JournalEntry) -> None:
@@ -421,7 +429,7 @@ class BatchRun:
         unit, facts = result.unit, {**result.facts, "seconds": round(result.seconds, 3)}
         digest = self.digests.pop(unit.program, "")
         outputs: dict[str, str] = {}
-        exit_code = result.exit_code
+        exit_code, edited = result.exit_code, self._list_edited(unit)
         try:
             if result.outputs:
                 outputs = self.target.write(result.outputs)
@@ -433,8 +441,17 @@ class BatchRun:
             exit_code, facts = 2, {"error": str(exc)}
         if len(unit.files) > 1:
             facts["with"] = unit.files[1:]
+        if edited:
+            facts["overwritten"] = edited
+            self.notes += [(place, EDITED) for place in edited]
         status = STATUS[exit_code]
         self.add(JournalEntry(unit.program, status, exit_code, digest, outputs, facts))
+
+    def _list_edited(self, unit: Unit) -> list[str]:
+        """Return the outputs of a unit that were edited since they were made."""
+        root = self.order.target
+        found = (list_edited(root / (place + SUFFIX)) for place in unit.programs)
+        return [path.relative_to(root).as_posix() for some in found for path in some]
 
     def tidy(self) -> None:
         """Remove what earlier runs wrote and this one did not, unless changed since."""

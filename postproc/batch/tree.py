@@ -87,6 +87,9 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
     only_read = {place for place, by in read if not _is_program_by_itself(place, by)}
     kept = [p for unit in units if unit.program in only_read for p in unit.own]
     units = [unit for unit in units if unit.program not in only_read]
+    others = {unit: why for unit in units if (why := _other_arm(root, unit, plan))}
+    refused |= {place: why for unit, why in others.items() for place in unit.own}
+    units = [unit for unit in units if unit not in others]
     # The largest first: no worker is left alone with one at the end.
     units.sort(key=lambda u: (u.setup, -sum(sizes[f] for f in u.files), u.program))
     return Tree(
@@ -97,6 +100,17 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
         tuple(note for part in found for note in part.notes),
         sum(sizes.values()),
     )
+
+
+def _other_arm(root: Path, unit: Unit, plan: BatchPlan) -> str:
+    """Return why the arm of a unit is not that of its cell, "" where it is."""
+    cell = plan.setups[unit.setup].cell
+    try:
+        file = file_named(root / unit.program)
+        file.refuse_other_arm(cell.arm_number, str(cell.path))
+    except ProgramError as exc:
+        return str(exc)
+    return ""
 
 
 def _is_program_by_itself(place: str, folder: PurePosixPath) -> bool:

@@ -265,7 +265,8 @@ def _result(task: Task, found: Outcome | Exception) -> Result:
     unit = task.unit
     match found:
         case Outcome():
-            outputs = _outputs(unit, task.files, found)
+            record = replace(found.record, read=task.digests)
+            outputs = _outputs(unit, task.files, replace(found, record=record))
             return Result(unit, found.exit_code, outputs, facts_of(found))
         case PostprocError():
             return make_failure(unit, str(found))

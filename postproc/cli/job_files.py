@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from postproc.cli.common import write_stdout
+from postproc.cli.common import say, write_stdout
 from postproc.cli.reports import NO_REPORTS, Reports
 from postproc.compensation.outcome import Outcome
+from postproc.compensation.output.sidecar import EDITED, SUFFIX, list_edited
 from postproc.compensation.program_files import ProgramFiles
 from postproc.exceptions import OutputError
 from postproc.files import (
@@ -79,7 +80,11 @@ class Destination:
         target = output or (None if own is None else default_output(own))
         files |= self._results(outcome, target, values)
         check_places(files, inputs)
+        records = [place for place in files if place.name.endswith(SUFFIX)]
+        edited = [path for record in records for path in list_edited(record)]
         write_all(files)
+        for path in edited:
+            say(f"{path}: {EDITED}")
         if target is None:
             write_stdout(outcome.outputs[self.given.name])
         return list(files)

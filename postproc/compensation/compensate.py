@@ -121,7 +121,8 @@ def compensate(
         load()
     outcome = compensate_files(given, cell, model, options, progress, processes)
     told = (*outcome.diagnostics, *given.report_omissions(cell))
-    outcome = replace(outcome, diagnostics=told, inputs=given.inputs)
+    record = replace(outcome.record, read=given.digests)
+    outcome = replace(outcome, diagnostics=told, inputs=given.inputs, record=record)
     if not judged:
         return outcome
     from postproc.compensation.findings.second_opinion import second_opinion
@@ -146,6 +147,9 @@ def compensate_files(
         PostprocError: As there.
     """
     files = given.by_name
+    if given.path is not None:
+        file = file_named(given.path)
+        file.refuse_other_arm(cell.arm_number, str(cell.path))
     check_preconditions(files, cell, model)
     cell = prepare_cell(cell, model, options)
     setting = Job(cell, model, options, Clock(progress), processes)

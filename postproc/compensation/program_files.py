@@ -10,7 +10,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from postproc.compensation.output.sidecar import sidecar_path
+from postproc.compensation.output.sidecar import (
+    path_between,
+    sha256,
+    sidecar_path,
+)
 from postproc.compensation.pages import (
     group_pages,
     is_output,
@@ -243,11 +247,34 @@ class ProgramFiles:
         """All bytes by name: the program first, its variable file last."""
         return name_files(self.name, self.source, self.variables, self.pages)
 
+    @property
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of all bytes, by name; of what is only read by the path to it.
+
+        What is given as bytes, and stands in another folder, is not among them.
+        """
+        here = Path() if self.path is None else self.path.absolute()
+        paths = {
+            file_named(path).name_for(here): path_between(here.parent, path.absolute())
+            for path in self.read_paths
+        }
+        return {
+            paths.get(name, name): sha256(data)
+            for name, data in self.by_name.items()
+            if name in paths or not _is_elsewhere(name)
+        }
+
     def report_omissions(self, cell: Cell) -> tuple[Diagnostic, ...]:
         """Say what is not followed, and what the program's backup knows of the arm."""
         if self.path is None:
             return self.notes
         return (*self.notes, *archive_notes(self.path, cell))
+
+
+def _is_elsewhere(name: str) -> bool:
+    """Return True if a file of a job need not stand beside the program."""
+    file = file_named(name)
+    return file.is_shared or file.is_from_elsewhere
 
 
 def program_files(

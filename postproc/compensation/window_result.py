@@ -24,7 +24,10 @@ from postproc.compensation.eligibility.configuration_flags import find_overruled
 from postproc.compensation.outcome import Decisions, find_judged
 from postproc.compensation.program import ParsedProgram, PlannedProgram
 from postproc.compensation.solver.decisions import NONE
-from postproc.compensation.solver.dependants import with_what_moves_along
+from postproc.compensation.solver.dependants import (
+    moves_along,
+    with_what_moves_along,
+)
 from postproc.compensation.solver.expected_error import ErrorLaws, LengthLaw
 from postproc.compensation.solver.iterate import Converged
 from postproc.diagnostics import NO_REASON
@@ -260,7 +263,8 @@ def correction_of(
     """Keep what a report says of corrected visits."""
     proposal, done, plan = found.proposal, found.reached, planned.plan
     moved = proposal.corrected
-    decided = with_what_moves_along(visits, planned, cell, proposal.decisions)
+    along = moves_along(visits, planned, cell, proposal.decisions)
+    decided = with_what_moves_along(visits, proposal.decisions, along)
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
     wanted = plan.tcp[:, :3, 3] + planned.shift
     before, after = np.full((2, len(visits)), np.nan)
@@ -277,7 +281,7 @@ def correction_of(
         before=before,
         after=after,
         laws=ErrorLaws.of(
-            found.foreseen, model.reading_spread, decided.correction, judged
+            found.foreseen, model.reading_spread, decided.correction + along, judged
         ),
         position=wanted - plan.aside,
         away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1) / MM,

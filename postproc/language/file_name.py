@@ -157,6 +157,17 @@ class FileName:
         """
         return 0
 
+    def refuse_other_arm(self, arm: int, cell: str) -> None:
+        """Refuse a program on the disk that its archive gives to another arm.
+
+        Args:
+            arm: The number of the cell's arm.
+            cell: The cell, for the message.
+
+        Raises:
+            ProgramError: It is another's, or one of several, and not known whose.
+        """
+
     def name_for(self, program: PurePath) -> str:
         """Return its name in a job that reads it and never rewrites it.
 

@@ -37,7 +37,6 @@ class Terms:
         laws: Names of the `OrientationLaw` members, by their number.
         border: Why flags of a joint so near a border must not be trusted; its number is
             filled in.
-        cloning: Whether `--shared-points clone` writes a point of its own.
     """
 
     tool: str
@@ -59,7 +58,6 @@ class Terms:
     arc: str
     laws: tuple[str, ...] = ()
     border: str = ""
-    cloning: str = "see --shared-points clone"
 
 
 WIDEST = -99999.9  # [mm, deg] no number of a target is longer as it is written

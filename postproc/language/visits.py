@@ -6,10 +6,11 @@ What a language hands to everything else; nothing after it knows how a program i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -30,6 +31,7 @@ from postproc.language.pose_encoding import Dialect
 from postproc.language.shifts import ANGLES, Shift, Shifts
 from postproc.language.text.symbol_column import NameColumn
 
+NO_LINES: Mapping[str, Collection[int]] = MappingProxyType({})
 START = -1  # predecessor: wherever the arm stands when the program starts
 ELSEWHERE = -2  # predecessor: a place that the program text does not tell
 
@@ -603,7 +605,10 @@ def deduplicate(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
 
 
 def never_reached(
-    missed: Mapping[str, Ints], begin: str, caller: str
+    missed: Mapping[str, Ints],
+    begin: str,
+    caller: str,
+    beside: Mapping[str, Collection[int]] = NO_LINES,
 ) -> list[Diagnostic]:
     """List the files with moves to targets that no way from the start leads to.
 
@@ -615,15 +620,20 @@ def never_reached(
         missed: Lines of such moves, ascending, by file.
         begin: Where ways begin, in the words of the language.
         caller: What may call the routine from elsewhere.
+        beside: Lines that run in ways that are not followed, by file.
     """
-    return [
-        Diagnostic(
-            name,
-            int(lines[0]),
-            Code.NEVER_REACHED,
-            f"moves that are never reached from {begin}: {len(lines)} (lines "
-            f"{line_ranges(lines)}). They are not compensated: give the {caller} that "
-            "calls their routine, or remove them",
+    found: list[Diagnostic] = []
+    for name, lines in missed.items():
+        runs = np.isin(lines, [*beside.get(name, ())])
+        texts = (
+            f"moves that are never reached from {begin}: {{}}. They are not "
+            f"compensated: give the {caller} that calls their routine, or remove them",
+            "moves that an interrupt, a trigger or another way that is not followed "
+            "leads to: {}. They are not compensated: it is not known from where the "
+            "arm comes",
         )
-        for name, lines in missed.items()
-    ]
+        for text, own in zip(texts, (lines[~runs], lines[runs]), strict=True):
+            if len(own):
+                told = text.format(f"{len(own)} (lines {line_ranges(own)})")
+                found.append(Diagnostic(name, int(own[0]), Code.NEVER_REACHED, told))
+    return found

@@ -261,8 +261,12 @@ class Model:
         return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta) + q)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Travel between processes without what was made of it."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        """Travel between processes without what was made of it, but for its id.
+
+        A model of an older release has that of its file, not the hash of its content.
+        """
+        names = [f.name for f in fields(self)] + ["id"]
+        return {name: value for name, value in vars(self).items() if name in names}
 
     @cached_property
     def _evaluators(self) -> ArmCache[Evaluator]:

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -361,9 +362,25 @@ class _KillingSetup:
     @property
     def cell(self):
         frame = sys._getframe(1)
+        if "tasks" not in frame.f_locals:  # the tree is being listed
+            return SimpleNamespace(arm_number=1, path="cell.toml")
         if any(t.unit.program == "killer.pdl" for t in frame.f_locals["tasks"]):
             os.kill(os.getpid(), signal.SIGKILL)
         raise PostprocError("reached")
+
+
+def test_an_edited_output_is_overwritten_with_a_note(tmp_path, run):
+    grow(tmp_path / "src", 2, 1)
+    assert run().notes == ()
+    (path,) = (tmp_path / "dst").rglob("job00000.pdl")
+    written = path.read_bytes()
+    path.write_bytes(written + b"-- taught again\r\n")
+    summary = run(resume=True)
+    assert path.read_bytes() == written and summary.exit_code == 0
+    ((place, told),) = summary.notes
+    assert place.endswith("job00000.pdl") and "was edited after" in told
+    assert '"overwritten"' in default_log(tmp_path / "dst").read_text()
+    assert run(resume=True).notes == ()
 
 
 def test_a_library_that_nobody_calls_is_not_passed_off_as_compensated(tmp_path, run):

@@ -107,11 +107,24 @@ def test_a_changed_source_is_found(trees, name):
     assert codes(check(target, source=source)) == {(name, "source-changed")}
 
 
-def test_an_unstamped_program_is_compared_with_the_source(trees):
-    # Only its values were edited: the record says nothing of the program itself.
+def test_an_unstamped_program_that_was_changed_is_found(trees):
+    # Only its values were corrected: it came out as it went in.
     source, target, _ = trees
     (target / "spot.pdl").write_bytes(SPOT.replace(b"p1\r\nEND", b"p1\r\n\r\nEND"))
-    assert codes(check(target, source=source)) == {("spot.pdl", "source-changed")}
+    assert codes(check(target)) == {("spot.pdl", "changed")}
+    assert codes(check(target, source=source)) == {("spot.pdl", "changed")}
+
+
+def test_an_older_record_does_not_tell_who_changed_an_unstamped_program(trees):
+    source, target, _ = trees
+    path = target / ("spot.pdl" + SUFFIX)
+    record = json.loads(path.read_text())
+    del record["read"]
+    path.write_text(json.dumps(record))
+    assert check(target, source=source).findings == ()
+    (target / "spot.pdl").write_bytes(SPOT.replace(b"p1\r\nEND", b"p1\r\n\r\nEND"))
+    (found,) = check(target, source=source).findings
+    assert found.code == "source-changed" and "does not tell which" in found.message
 
 
 def test_a_record_that_is_missing_or_broken_or_of_another_file(trees):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,37 @@ def test_a_cell_that_agrees_with_the_backup_lacks_no_base(tree):
 def test_a_backup_of_two_arms_places_none(tree):
     found = read_backup(tree / "backup")
     assert found.root == () and found.entries == {"arms": (1, 2)}
+
+
+def second_task(tree):
+    """Add a second task with the same job, and a system module."""
+    first, second = (tree / "backup" / "RAPID" / f"TASK{k}" for k in (1, 2))
+    shutil.copytree(first, second)
+    return "RAPID/TASK2/PROGMOD/Job.mod"
+
+
+def test_a_program_of_another_arm_is_absent_and_its_system_modules_are_copied(tree):
+    job = second_task(tree)
+    found = run(tree)
+    assert found.exit_code == 2
+    assert f"absent: {job}" in found.output and "moves ROB_2, arm 2" in found.output
+    assert not (tree / "out" / job).exists()
+    assert (tree / "out" / "RAPID/TASK2/SYSMOD/user.sys").exists()
+    assert (tree / "out" / "RAPID/TASK1/PROGMOD/Job.mod").exists()
+
+
+def test_a_plan_gives_every_arm_of_a_backup_its_cell(tree):
+    job = second_task(tree)
+    text = (tree / "cell.toml").read_text()
+    other = text.replace("[robot]", "[robot]\narm_number = 2")
+    (tree / "second.toml").write_text(other)
+    rule = '[[rule]]\npattern = "**"\narm = {}\ncell = "{}"\nmodel = "model.json"\n'
+    rules = rule.format(2, "second.toml") + rule.format(1, "cell.toml")
+    (tree / "plan.toml").write_text(rules)
+    plan = make_plan(tree / "plan.toml", None, None, Options())
+    found = scan(tree / "backup", plan)
+    numbers = {u.program: plan.setups[u.setup].cell.arm_number for u in found.units}
+    assert numbers == {"RAPID/TASK1/PROGMOD/Job.mod": 1, job: 2} and not found.refused
 
 
 def test_a_folder_without_settings_is_no_backup(tmp_path):
@@ -148,7 +180,7 @@ def test_a_batch_knows_what_other_tasks_may_change(
     task = tree / "backup" / "RAPID" / "TASK1"
     for path in (task / "PROGMOD" / "Job.mod", task / "SYSMOD" / "user.sys"):
         path.write_text(path.read_text().replace("TASK PERS wobjdata", "PERS wobjdata"))
-    other = tree / "backup" / "RAPID" / "TASK2" / "PROGMOD" / "Job.mod"
+    other = tree / "backup" / "RAPID" / "TASK3" / "PROGMOD" / "Job.mod"
     other.parent.mkdir(parents=True)
     other.write_text(OTHER.format(declared, body))
     found = run(tree)
@@ -157,7 +189,7 @@ def test_a_batch_knows_what_other_tasks_may_change(
     before, after = (d / "PROGMOD" / "Job.mod" for d in (task, out / "TASK1"))
     point = next(line for line in before.read_text().splitlines() if "p1:=" in line)
     assert (point in after.read_text()) == bool(code)
-    same = out / "TASK2" / "PROGMOD" / "Job.mod"
+    same = out / "TASK3" / "PROGMOD" / "Job.mod"
     assert same.read_bytes() == other.read_bytes()  # nothing corrected, and no stamp
     assert (after.with_name("Job.mod.postproc.json")).is_file()
     plan = make_plan(None, tree / "cell.toml", tree / "model.json", Options())

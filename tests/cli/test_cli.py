@@ -59,6 +59,18 @@ def test_default_output_lies_beside_the_program_and_is_restorable(desk):
     assert out.read_bytes() == source.read_bytes()
 
 
+def test_an_edited_output_is_overwritten_with_a_word(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT))
+    out = desk.folder / "out.pdl"
+    assert "was edited" not in desk.compensate(source, "-o", out).stderr
+    assert "was edited" not in desk.compensate(source, "-o", out).stderr
+    out.write_bytes(out.read_bytes() + b"-- taught again\r\n")
+    found = desk.compensate(source, "-o", out)
+    assert found.exit_code == 0 and found.stderr.count("out.pdl: was edited after") == 1
+    assert cli("restore", out).exit_code == 0
+    assert "was edited" not in desk.compensate(source, "-o", out).stderr
+
+
 def test_stamp_is_one_line_in_the_files_own_ending(desk):
     for name, ending in (("crlf.pdl", b"\r\n"), ("lf.pdl", b"\n")):
         source = desk.put(name, program(FIRST, POSE).replace(b"\r\n", ending))

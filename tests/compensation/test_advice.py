@@ -37,3 +37,9 @@ def test_cloning_does_not_part_what_one_move_makes():
     lost = {line for line, why in advice("rapid/job18").items() if NO_HELP in why}
     left = count(HERE / "rapid/job18", options=Options(shared_points="clone")).reasons
     assert lost and lost <= {line for (_, line), why in left.items() if why}
+
+
+def test_a_run_that_has_cloned_does_not_advise_to_clone():
+    found = advice("rapid/job05", shared_points="clone")
+    assert any(OWN in why and "can write none here" in why for why in found.values())
+    assert not any("see --shared-points clone" in why for why in found.values())

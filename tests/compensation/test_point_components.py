@@ -98,8 +98,6 @@ CERTAIN = {
         ["q.trans:=p1.trans;", "q.rot:=p1.rot;", "q.robconf:=p1.robconf;",
          "q.extax:=p1.extax;", go("q")], [{}]),
     "shifted from itself": (["q:=P1;", "q:=Offs(q,0,0,40);", go("q")], [UP]),
-    "shifted in a move": (
-        ["q:=P1;", "q.trans.z:=q.trans.z+40;", go("Offs(q,0,0,-15)")], [{"z": 25.0}]),
     "an array in a loop": (
         ["FOR i FROM 1 TO 3 DO", "s{i}:=Offs(p1,0,0,i*20);", "ENDFOR",
          "FOR i FROM 1 TO 3 DO", go("s{i}"), "ENDFOR"],
@@ -256,8 +254,19 @@ def test_what_is_not_certain_is_not_followed(shop, kind):
     assert own in const[0]
 
 
+def test_a_shift_in_a_move_is_corrected_where_its_point_was_shifted_before(shop):
+    lines = ["q:=P1;", "q.trans.z:=q.trans.z+40;", go("Offs(q,0,0,-15)"), go("P3")]
+    written, done = rapid_done(shop, lines, MORE)
+    own = inline(shop.point("p1"), shop.job, "p1")
+    _, twin = rapid_done(shop, [go(moved(own, z=25.0)), go("P3")])
+    compare(done, twin, 2)
+    now = done.outputs["m.mod"].decode().splitlines()
+    assert {*written[:2]} <= {*now} and written[2] not in now
+    assert done.decisions.status[-2] == Status.CORRECTED
+
+
 def test_a_reason_names_the_component_and_its_line(shop):
-    lines = ["q:=P1;", "q.trans.z:=q.trans.z+40;", go("q")]
+    lines = ["q:=P1;", "q.trans.z:=700;", go("q")]
     _, done = rapid_done(shop, lines)
     d = done.decisions
     text = done.outputs["m.mod"].decode().splitlines()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pickle
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -87,7 +88,10 @@ def test_a_model_file_of_an_older_release_keeps_its_id(tmp_path: Path) -> None:
     data["id"] = content_id(data)
     path = tmp_path / "m.json"
     path.write_text(json.dumps(data))
-    assert load_model(path).id == data["id"] != model().id
+    older = load_model(path)
+    assert older.id == data["id"] != model().id
+    assert pickle.loads(pickle.dumps(older)).id == older.id  # in every process
+    assert replace(older, rows=7).id != older.id
 
 
 HERE = Provenance("2026-11-27", "nj220-2.7", "A 17", "AT960", "postproc 0.2.0")

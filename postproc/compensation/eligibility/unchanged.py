@@ -58,11 +58,19 @@ def may_clone_exported(visits: Visits, options: Options) -> bool:
     return options.shared_points == "clone" and visits.dialect.runs_alone
 
 
+def tell_cloning(options: Options) -> str:
+    """Say what clones do for a move that needs a point of its own."""
+    if options.shared_points == "clone":
+        return "--shared-points clone can write none here"
+    return "see --shared-points clone"
+
+
 def mark_disagreement(
     visits: Visits,
     agreement: Agreement,
     stay: Mapping[Reason, Bools],
     cell: Cell,
+    options: Options,
     reasons: Reasons,
 ) -> tuple[Bools, Bools]:
     """Mark the visits of literals whose arrivals disagree, or that must stay.
@@ -88,12 +96,12 @@ def mark_disagreement(
     if differ.any():
         alone = by_one_move(visits, agreement.group, len(together))[at]
         reasons.mark(differ & alone, Reason(code, f"{text}{_ONE_MOVE}"))
-    cloning = visits.dialect.terms.cloning
+    cloning = tell_cloning(options)
     text += f"give each move a point of its own ({cloning})"
     reasons.mark(differ, Reason(code, text))
     for why, literals in stay.items():
         reasons.mark(conflict & literals[at], why)
-    reasons.mark(conflict, OTHER_ARRIVAL)
+    reasons.mark(conflict, Reason(Code.DEPENDANT_WORSE, _OTHER_ARRIVAL.format(cloning)))
     return together, conflict
 
 
@@ -108,10 +116,9 @@ EXPORTED = Reason(
     Code.EXPORTED_VARIABLE,
     "other programs may read this variable too (see edit_exported)",
 )
-OTHER_ARRIVAL = Reason(
-    Code.DEPENDANT_WORSE,
+_OTHER_ARRIVAL = (
     "another arrival at this point cannot be corrected: give each move a point of its "
-    "own (see --shared-points clone)",
+    "own ({})"
 )
 SEVERAL_MOVES = Reason(
     Code.SHARED_POINT, "several moves go to this point (shared_points = leave)"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -27,6 +28,7 @@ T = TypeVar("T")
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
 CURE = "Restore needs the record that was written beside the program"
+EDITED = "was edited after it was compensated: overwritten. Edit its source instead"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
 
 
@@ -52,6 +54,15 @@ def file_sha256(path: str | Path) -> str:
     """
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def path_between(folder: PurePath, file: PurePath) -> str:
+    """Return the path of a file from a folder on, with ``/``; both from one root.
+
+    >>> path_between(PurePath("R1/Program"), PurePath("R1/System/$config.dat"))
+    '../System/$config.dat'
+    """
+    return PurePath(os.path.relpath(file, folder)).as_posix()
 
 
 def block_checksums(data: bytes) -> list[int]:
@@ -151,6 +162,8 @@ class Sidecar:
             where the first call of each stands, and its message.
         tolerance: How many targets pass which tolerance, as
             `ToleranceCheck.to_record` writes it; empty where nobody asked.
+        read: SHA-256 of every file that the job was read from, as it was then, by its
+            path from the folder of the record; empty in records of older versions.
     """
 
     version: str
@@ -160,6 +173,7 @@ class Sidecar:
     left: tuple[LeftLine, ...] = ()
     assumed: tuple[AssumedLine, ...] = ()
     tolerance: Mapping[str, Any] = field(default_factory=dict)
+    read: Mapping[str, str] = field(default_factory=dict)
 
     def list_uncorrected_in(self, name: str) -> tuple[LeftLine, ...]:
         """Return what was left in a file, beside what its own record tells."""
@@ -173,6 +187,7 @@ class Sidecar:
         head |= {"assumed": self.assumed} if self.assumed else {}
         head |= {"tolerance": dict(self.tolerance)} if self.tolerance else {}
         head["options"] = dict(self.options)
+        head |= {"read": dict(self.read)} if self.read else {}
         yield (json.dumps(head)[:-1] + ', "files": {').encode()
         for number, (name, record) in enumerate(self.files.items()):
             yield f"{', ' if number else ''}{json.dumps(name)}: ".encode()
@@ -183,7 +198,7 @@ class Sidecar:
         """Let the record speak of its files by other names.
 
         Args:
-            names: New names by old ones; files that have none are left out.
+            names: New names by old ones; outputs that have none are left out.
         """
         files = {names[name]: r for name, r in self.files.items() if name in names}
         main = next(iter(self.files), None)
@@ -197,8 +212,17 @@ class Sidecar:
             )
 
         return replace(
-            self, files=files, left=own(self.left), assumed=own(self.assumed)
+            self,
+            files=files,
+            left=own(self.left),
+            assumed=own(self.assumed),
+            read={names.get(name, name): digest for name, digest in self.read.items()},
         )
+
+    def source_of(self, name: str) -> str | None:
+        """Return the SHA-256 of the source of a file, None where it is not told."""
+        record = self.files.get(name)
+        return self.read.get(name) if record is None else record.source_sha256
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -217,6 +241,23 @@ def read_without_edits(path: Path) -> Sidecar:
         ProgramError: It is missing, or not a record.
     """
     return _record(path, _without_edits(read_input(path, CURE)))
+
+
+def list_edited(record: Path) -> list[Path]:
+    """Return the outputs beside a record that were changed since they were written.
+
+    Those that were restored are not among them. Nothing where there is no record, or
+    none that can be read.
+    """
+    try:
+        told = read_without_edits(record)
+    except ProgramError:
+        return []
+    own = record.name.removesuffix(SUFFIX)
+    ours = {name: {digest} for name, digest in told.read.items() if name == own}
+    ours |= {n: {f.source_sha256, f.output_sha256} for n, f in told.files.items()}
+    found = ((record.with_name(name), digests) for name, digests in ours.items())
+    return [p for p, digests in found if p.is_file() and file_sha256(p) not in digests]
 
 
 def _without_edits(text: bytes) -> bytes:
@@ -248,7 +289,8 @@ def _record(path: Path, text: bytes) -> Sidecar:
             (str(f), int(n), str(text)) for f, n, text in data.get("assumed", ())
         )
         options, tolerance = data.get("options", {}), dict(data.get("tolerance", {}))
-        return Sidecar(version, model, files, options, left, assumed, tolerance)
+        read = {name: str(digest) for name, digest in data.get("read", {}).items()}
+        return Sidecar(version, model, files, options, left, assumed, tolerance, read)
     except (
         *(ValueError, KeyError, TypeError, AttributeError),
         *(RecursionError, OverflowError),

@@ -28,6 +28,7 @@ from postproc.compensation.eligibility.unchanged import (
     mark_disagreement,
     mark_unchanged,
     may_clone_exported,
+    tell_cloning,
     without_target,
 )
 from postproc.compensation.options import Job
@@ -274,7 +275,7 @@ class Round:
         settled = self._settle(usable)
         agreement, stay = settled.agreement, settled.stay
         chosen, conflict = mark_disagreement(
-            visits, agreement, stay, self.setting.cell, reasons
+            visits, agreement, stay, self.setting.cell, self.setting.options, reasons
         )
         status = np.where(reasons.none, Status.CORRECTED, Status.REJECTED)
         status[conflict] = Status.CONFLICT
@@ -422,14 +423,14 @@ class Round:
         visits, cell = self.reading.visits, self.setting.cell
         limit, trusted = cell.limits.conflict_mm, self._is_trusted
         hurt = would_worsen(visits, agreement, change, trusted, limit, absorbing)
-        cloning = visits.dialect.terms.cloning
+        options = self.setting.options
+        cloning = tell_cloning(options)
         stay = {Reason(Code.NUMBERS_USED_ELSEWHERE,
                        f"{why}: give the move a point of its own ({cloning})"): rows
                 for why, pins in visits.literals.pins.items()
                 if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
         text = f"a target computed from it would land farther off ({cloning})"
         stay[Reason(Code.DEPENDANT_WORSE, text)] = hurt
-        options = self.setting.options
         if options.shared_points == "leave":
             count = len(agreement.literal)
             stay[SEVERAL_MOVES] = ~by_one_move(visits, agreement.group, count)

@@ -144,10 +144,10 @@ WITH_POINT = "it still moves with the point that it is computed from"
 WITH_BEGIN = "it still moves with the target that it begins at"
 
 
-def with_what_moves_along(
+def moves_along(
     visits: Visits, planned: PlannedProgram, cell: Cell, found: Decisions
-) -> Decisions:
-    """Say of targets that are left where they move all the same.
+) -> Floats:
+    """Tell what targets that are left move by all the same, (n, 3) [m], base frame.
 
     Args:
         visits: n arrivals.
@@ -158,7 +158,18 @@ def with_what_moves_along(
     own = (found.status == Status.CORRECTED)[:, None]
     values, shift = found.corrected, np.where(own, found.correction, 0.0)
     moves = np.nan_to_num(with_dependants(visits, planned, cell, values, shift))
-    along = ~own[:, 0] & (lengths(moves) > ALONG)
+    return np.where(own, 0.0, moves)
+
+
+def with_what_moves_along(visits: Visits, found: Decisions, moves: Floats) -> Decisions:
+    """Say of targets that are left where they move all the same.
+
+    Args:
+        visits: n arrivals.
+        found: What was decided for them.
+        moves: What those move by, see `moves_along`, (n, 3) [m].
+    """
+    along = lengths(moves) > ALONG
     told = np.isin(
         visits.target.meaning, (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
     )

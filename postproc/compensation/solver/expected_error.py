@@ -160,8 +160,8 @@ class ErrorLaws:
             found: The predicted errors.
             spread: How held-out readings scatter against their noise, see
                 `Model.reading_spread`; below 1 it counts as 1.
-            correction: Change of their commanded TCP, base frame, (n, 3) [m]; zero
-                where nothing was corrected.
+            correction: Change of their commanded TCP, base frame, (n, 3) [m]: of a
+                target that was left, what it moves by along with its point; else zero.
             judged: Whether visits have a target that they can miss, (n,).
         """
         unsure = np.isnan(found.error + found.covariance[:, :3] + correction)

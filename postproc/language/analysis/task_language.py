@@ -129,7 +129,8 @@ class TaskLanguage(Language):
         machine.root.forget()
         quiet = [f for f in task.files if f.is_system and not self.tells_system]
         odd = (d for f in task.files if f not in quiet for d in f.diagnostics)
-        told = never_reached(missed, *self.name_main(task.files))
+        beside = machine.list_lines_beside() if missed else {}
+        told = never_reached(missed, *self.name_main(task.files), beside)
         found = {*odd, *machine.diagnostics, *told}
         files = (*task.files, *task.files_beside)
         return JobReading(

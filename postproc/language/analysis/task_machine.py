@@ -597,6 +597,14 @@ class TaskMachine(BlockMachine[Arrived]):
         """List names of data that change in ways that are not followed."""
         return self._list_changes({*self.beside, *self._list_beside()})
 
+    def list_lines_beside(self) -> dict[str, set[int]]:
+        """Return the lines that run in ways that are not followed, by file."""
+        found: dict[str, set[int]] = {}
+        for file, row in self.rows_of({*self.beside, *self._list_beside()}):
+            text = self.texts[file]
+            found.setdefault(text.source.name, set()).add(int(text.begin_line[row]))
+        return found
+
     def _list_changes(self, parts: set[tuple[int, int, int]]) -> frozenset[str]:
         """List names of data that statements change, as `beside`, and what they call.
 

@@ -6,7 +6,7 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
 
@@ -42,7 +42,7 @@ from postproc.language.krl.inline_forms import COPIES, find_alike, sets_alone
 from postproc.language.krl.pose_encoding import COMMENTS, COMPONENTS, KRL_DIALECT
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.shifts import Pose, Shift, ShiftKind
-from postproc.language.text.source import KEPT_FILES, Source, parse_shared
+from postproc.language.text.source import Source, keep_short, parse_shared
 from postproc.language.text.symbol_column import read_names
 from postproc.language.text.templates import name_index
 
@@ -578,14 +578,14 @@ def is_word(operand: ir.Operand | None, word: str) -> bool:
     return operand == ir.DataObject(word)
 
 
-@lru_cache(KEPT_FILES)
+@keep_short
 def list_changes(*sources: Source) -> tuple[SharedChange, ...]:
     """List what a program with its data list changes of what all share."""
     files = [parse_shared(read_krl, one) for one in sources]
     return tuple(list_shared_changes(KrlTask(files)))
 
 
-@lru_cache(KEPT_FILES)
+@keep_short
 def list_calls(*sources: Source) -> tuple[OutsideCall, ...]:
     """List the routines that a program calls and does not hold."""
     files = [parse_shared(read_krl, one) for one in sources]
@@ -599,7 +599,7 @@ _MODE = re.compile(
 )
 
 
-@lru_cache(KEPT_FILES)
+@keep_short
 def find_modes(source: Source) -> frozenset[str]:
     """Name the modes that a program, or its list, sets to others than at its begin."""
     found = _MODE.finditer(source.data)

@@ -17,8 +17,8 @@ from postproc.language.pdl2.files import Pdl2FileName
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.side_effects import rows_effects
 from postproc.language.text.source import (
-    KEPT_FILES,
     Source,
+    keep_short,
     parse_shared,
     source_from_bytes,
 )
@@ -113,7 +113,7 @@ def _arm_of(source: Source) -> int:
     return Pdl2FileName(source.name).arm(source.data[:HEAD])
 
 
-@lru_cache(KEPT_FILES)
+@keep_short
 def _list_acts(source: Source) -> OutsideActs:
     """Return what a program may do to others."""
     program = parse_shared(parse, source)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,15 +17,18 @@ from postproc.language.language import Archive
 from postproc.language.rapid.files import RapidFileName
 from postproc.language.rapid.pose_encoding import RAPID_DIALECT
 from postproc.language.rapid.program import read_rapid
+from postproc.language.rapid.settings import (
+    find_settings,
+    list_entries,
+    number_arms,
+    settings_above,
+)
 from postproc.language.text.source import source_from_bytes
 from postproc.robot.pose import record_from_pose
 
 PROGRAMS, SYSTEM = "progmod", "sysmod"  # folders of a task
-SETTINGS = ("syspar", "moc.cfg")
 ARM_AXES = 6
 READ_BEFORE = 4096  # modules of which is known whether they can be read
-DEPTH = 4  # folders above a program in which the settings of its backup may lie
-_ENTRY = re.compile(r'-(\w+)\s+("[^"]*"|[^\s\\]+)')
 _PLACE = tuple(f"base_frame_pos_{axis}" for axis in "xyz")
 _TURN = tuple(f"base_frame_orient_u{k}" for k in range(4))
 
@@ -99,24 +101,17 @@ def _modules(
 
 def read_mounted_arms(program: Path) -> tuple[MountedArm, ...]:
     """Return the arms of the backup that a program stands in, none where none is."""
-    file = _find_settings([*program.absolute().parents][:DEPTH])
+    file = settings_above(program)
     return () if file is None else read_arms(file.read_text(encoding="latin-1"))
 
 
-def _find_settings(places: Iterable[Path]) -> Path | None:
-    """Find ``MOC.cfg`` in the first of some folders that is a backup."""
-    folders = filter(None, (_entry(place, SETTINGS[0]) for place in places))
-    files = filter(None, (_entry(folder, SETTINGS[1]) for folder in folders))
-    return next(filter(Path.is_file, files), None)
-
-
 def read_arms(text: str) -> tuple[MountedArm, ...]:
-    """Read the arms of ``MOC.cfg``."""
+    """Read the arms of ``MOC.cfg``, by their numbers."""
     arms = []
-    for said in _entries(text, "ROBOT"):
+    for said in number_arms(list_entries(text, "ROBOT")):
         try:
-            place = tuple(1000.0 * float(said.get(key, 0.0)) for key in _PLACE)
-            turn = tuple(float(said.get(k, k == _TURN[0])) for k in _TURN)
+            place = tuple(1000.0 * float(said.get(key) or 0.0) for key in _PLACE)
+            turn = tuple(float(said.get(k) or k == _TURN[0]) for k in _TURN)
         except ValueError:
             continue
         kind = said.get("use_robot_type", "")
@@ -131,35 +126,16 @@ def read_axes(text: str) -> dict[int, str]:
     the first external one. Those that it does not give are counted in their order.
     """
     joints = {
-        one["name"]: one.get("logical_axis", "") for one in _entries(text, "JOINT")
+        one["name"]: one.get("logical_axis", "") for one in list_entries(text, "JOINT")
     }
     found: dict[int, str] = {}
-    for unit in _entries(text, "SINGLE"):
+    for unit in list_entries(text, "SINGLE"):
         logical = joints.get(unit.get("use_joint", ""), "")
         axis = int(logical) - ARM_AXES if logical.isdigit() else 0
         if axis < 1 or axis in found:
             axis = next(k for k in itertools.count(1) if k not in found)
         found[axis] = unit["name"]
     return dict(sorted(found.items()))
-
-
-def _entries(text: str, kind: str) -> list[dict[str, str]]:
-    """Return the entries of one kind, each with what it says."""
-    body = re.split(rf"^{kind}:", text, maxsplit=1, flags=re.MULTILINE)
-    own = re.split(r"^#", body[-1], maxsplit=1, flags=re.MULTILINE)[0]
-    parts = re.split(r"(?=-name\s)", own)[1:] if len(body) > 1 else []
-    said = [dict(_ENTRY.findall(part)) for part in parts]
-    named = (one for one in said if "name" in one)
-    return [{key: value.strip('"') for key, value in one.items()} for one in named]
-
-
-def _entry(folder: Path, name: str) -> Path | None:
-    """Find an entry of a folder, whatever its case."""
-    try:
-        found = (p for p in folder.iterdir() if p.name.lower() == name)
-        return next(found, None)
-    except OSError:
-        return None
 
 
 @lru_cache(maxsize=READ_BEFORE)
@@ -181,7 +157,7 @@ def read_backup(folder: Path) -> Archive | None:
     The backup is the folder, or lies in it. Of several arms no place is given.
     """
     inside = folder.iterdir() if folder.is_dir() else ()
-    file = _find_settings((folder, *sorted(p for p in inside if p.is_dir())))
+    file = find_settings((folder, *sorted(p for p in inside if p.is_dir())))
     if file is None:
         return None
     text, base = file.read_text(encoding="latin-1"), tuple[float, ...]()

@@ -6,9 +6,11 @@ import re
 from pathlib import Path, PurePath
 from typing import ClassVar
 
+from postproc.exceptions import ProgramError
 from postproc.files import FolderListing, read_if_readable
 from postproc.language.file_name import FileName, Named, Skip
 from postproc.language.measuring_program import is_measuring_program
+from postproc.language.rapid.settings import UNKNOWN, arm_of_task
 
 SYSTEM_MODULES, SYSTEM_SUFFIXES = "SYSMOD/", (".sys", ".sysx")
 OTHER_TASKS, OTHER_MODULES = "TASKS/", "MODULES/"
@@ -103,6 +105,40 @@ class RapidFileName(FileName):
         if path.parent == program.parent:
             return f"{OTHER_MODULES}{path.name}"
         return f"{SYSTEM_MODULES}{path.name}"
+
+    def arm(self, head: bytes) -> int:
+        """Return the arm of a backup that the task of the module moves.
+
+        It is 0 where there is one arm at most, -1 where it is one of several and not
+        known which.
+        """
+        return arm_of_task(Path(self.place)).number
+
+    def refuse_other_arm(self, arm: int, cell: str) -> None:
+        """Refuse a module of a backup whose task moves another arm than the cell's.
+
+        Raises:
+            ProgramError: It does, or it is not known which of several it moves.
+        """
+        found = arm_of_task(Path(self.place))
+        if found.number in (0, arm):
+            return
+        if found.number == UNKNOWN:
+            names = ", ".join(found.arms)
+            problem = f"its backup has the arms {names}: which it moves is not known"
+            cure = (
+                "Add SYSPAR/SYS.cfg and BACKINFO/backinfo.txt to the backup, or take "
+                "the module out of it and give the cell of its arm"
+            )
+            raise ProgramError(self.name, problem, cure)
+        name, number = found.arms[found.number - 1], found.number
+        raise ProgramError(
+            self.name,
+            f"its task {found.task} moves {name}, arm {number} of its backup, and the "
+            f"cell ({cell}) is of arm {arm}",
+            f"Give the cell of that arm, with arm_number = {number} under [robot], and "
+            "its model",
+        )
 
 
 FILES = RapidFileName

@@ -7,7 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import chain
 
 from postproc.language import ir
@@ -44,7 +44,7 @@ from postproc.language.rapid.instructions import (
 from postproc.language.rapid.pose_encoding import COMMENTS, RAPID_DIALECT, WIDTH
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.shifts import Shift, ShiftKind
-from postproc.language.text.source import KEPT_FILES, Source, parse_shared
+from postproc.language.text.source import Source, keep_short, parse_shared
 
 _UNREAD = re.compile(rb'"[^"\n]*"|![^\n]*')
 _BLANK = bytes(
@@ -434,14 +434,14 @@ def as_assignment(
     return None
 
 
-@lru_cache(KEPT_FILES)
+@keep_short
 def list_changes(source: Source) -> tuple[SharedChange, ...]:
     """List what a module changes of others' data, without a name of any of them."""
     task = RapidTask([parse_shared(read_rapid, source)])
     return (*task.changes_by_string, *list_shared_changes(task))
 
 
-@lru_cache(KEPT_FILES)
+@keep_short
 def list_names(source: Source) -> frozenset[str]:
     """List the words of a module that are no names of data which it declares."""
     file = parse_shared(read_rapid, source)

@@ -7,7 +7,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, wraps
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar, overload
 
@@ -21,7 +21,8 @@ from postproc.exceptions import PostprocError, ProgramError
 AT_ONCE = 50_000  # edits that are Python objects at the same time
 T = TypeVar("T")
 LAST = 2**31 - 1  # offset in a file; none that is read is as long
-KEPT_FILES = 256  # files that are kept as they were read
+KEPT_FILES = 256  # of which is kept what was found in them
+KEPT_BYTES = 1 << 18  # of such a file, at the most
 
 
 class Span(NamedTuple):
@@ -279,7 +280,19 @@ def parse_once(
     return found
 
 
-@lru_cache(KEPT_FILES)
+def keep_short(find: Callable[..., T]) -> Callable[..., T]:
+    """Let a function keep what it finds in short sources, which it is given last."""
+    keeping = lru_cache(KEPT_FILES)(find)
+
+    @wraps(find)
+    def either(*given: Any) -> T:
+        sizes = (len(one.data) for one in given if isinstance(one, Source))
+        return (keeping if sum(sizes) <= KEPT_BYTES else find)(*given)
+
+    return either
+
+
+@keep_short
 def parse_shared(parse: Callable[[Source], T], source: Source) -> T:
     """Parse a file that many programs of a folder read, once for all of them."""
     return parse(source)

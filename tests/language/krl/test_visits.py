@@ -670,6 +670,23 @@ def test_a_frame_that_nobody_knows_is_told_so():
 def test_dead_moves_are_listed():
     found = job("LIN XP1", "RETURN", "LIN XP2", more="DEF never ( )\nLIN XP1\nEND")
     assert "never-reached" in codes(found) and len(found.visits) == 1
+    (told,) = (d.message for d in found.diagnostics if d.code == "never-reached")
+    assert "or remove them" in told
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["INTERRUPT DECL 5 WHEN $IN[1] DO stopped ( )",
+     "TRIGGER WHEN DISTANCE=0 DELAY=0 DO stopped ( ) PRIO=-1"],
+)  # fmt: skip
+def test_moves_that_an_interrupt_runs_are_not_to_be_removed(line):
+    more = "DEF stopped ( )\nback ( )\nEND\nDEF back ( )\nLIN XP2\nEND\n"
+    found = job(line, "LIN XP1", more=f"{more}DEF never ( )\nLIN XP1\nEND")
+    told = [d.message for d in found.diagnostics if d.code == "never-reached"]
+    assert len(told) == 2 and len(found.visits) == 1
+    (run,) = (text for text in told if "an interrupt, a trigger" in text)
+    (dead,) = (text for text in told if "remove" in text)
+    assert "1 (lines" in run and "1 (lines" in dead and "remove" not in run
 
 
 @pytest.mark.parametrize("lines", [["IF N2 THEN", "LIN XP1"], ["ENDLOOP"], ["LOOP"]])

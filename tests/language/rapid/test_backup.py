@@ -23,6 +23,34 @@ ROBOT:
 SINGLE:
       -name "STN1" -base_frame_pos_x 9
 """
+SYS = r"""SYS:CFG_1.0:6:0::
+#
+CAB_TASKS:
+
+      -Name "T_ROB2" -Type "NORMAL" -UseMechanicalUnitGroup "rob2" -MotionTask
+
+      -Name "T_CTRL" -Type "STATIC" -Entry "Main"\
+      -TrustLevel "None"
+
+      -Name "T_ROB1" -Type "NORMAL" -MotionTask -UseMechanicalUnitGroup "rob1"
+#
+MECHANICAL_UNIT_GROUP:
+
+      -Name "rob1" -Robot "ROB_1" -MechanicalUnit_1 "TRACK_1"\
+      -UseMotionPlanner "motion_planner_1"
+
+      -Name "rob2" -Robot "ROB_2" -UseMotionPlanner "motion_planner_2"
+#
+"""
+INFO = """>>SYSPAR:
+SYS.cfg
+>>TASK1: (T_ROB1,,)
+SYSMOD/user.sys @
+>>TASK2: (T_ROB2,main,)
+PROGMOD/Job.mod @
+>>TASK3: (T_CTRL,,)
+>>EOF:
+"""
 GIVEN = ("cell.toml", "model.json")
 
 
@@ -42,13 +70,16 @@ def backup(tmp_path):
     (task / "SYSMOD" / "user.sys").write_text(user)
     (task / "SYSMOD" / "coded.sys").write_bytes(bytes(range(256)))
     (tmp_path / "SYSPAR" / "MOC.cfg").write_text(MOC)
+    (tmp_path / "SYSPAR" / "SYS.cfg").write_text(SYS)
+    (tmp_path / "BACKINFO").mkdir()
+    (tmp_path / "BACKINFO" / "backinfo.txt").write_text(INFO)
     for name in GIVEN:
         (tmp_path / name).write_bytes((HERE / "rapid" / name).read_bytes())
     return tmp_path
 
 
-def run(backup, *more):
-    job = backup / "RAPID" / "TASK1" / "PROGMOD" / "Job.mod"
+def run(backup, *more, task="TASK1"):
+    job = backup / "RAPID" / task / "PROGMOD" / "Job.mod"
     given = ("--cell", backup / "cell.toml", "--model", backup / "model.json")
     return cli("compensate", job, *given, "-o", backup / "out" / "Job.mod", *more)
 
@@ -104,3 +135,31 @@ def test_arms_of_a_backup():
 def test_the_settings_are_found_above_the_program(backup, tmp_path):
     job = backup / "RAPID" / "TASK1" / "PROGMOD" / "Job.mod"
     assert [arm.name for arm in read_mounted_arms(job)] == ["ROB_1", "ROB_2"]
+
+
+def test_a_module_of_another_arm_than_the_cell_s_is_refused(backup):
+    (backup / "out").mkdir()
+    (backup / "RAPID" / "TASK1").rename(backup / "RAPID" / "TASK2")
+    found = run(backup, task="TASK2")
+    assert found.exit_code == 2 and not [*(backup / "out").iterdir()]
+    assert "task T_ROB2 moves ROB_2, arm 2 of its backup" in found.stderr
+    assert "arm_number = 2 under [robot]" in found.stderr
+    cell = backup / "cell.toml"
+    text = cell.read_text()
+    cell.write_text(text.replace("[robot]", "[robot]\narm_number = 2"))
+    assert run(backup, task="TASK2").exit_code == 0
+    (backup / "RAPID" / "TASK2").rename(backup / "RAPID" / "TASK1")
+    found = run(backup)
+    assert found.exit_code == 2 and "T_ROB1 moves ROB_1, arm 1" in found.stderr
+
+
+@pytest.mark.parametrize("gone", ["SYSPAR/SYS.cfg", "BACKINFO/backinfo.txt"])
+def test_of_several_arms_the_backup_must_tell_which(backup, gone):
+    (backup / "out").mkdir()
+    (backup / gone).unlink()
+    found = run(backup)
+    assert found.exit_code == 2
+    assert "has the arms ROB_1, ROB_2: which it moves is not known" in found.stderr
+    one_arm = MOC.replace('      -name "ROB_2"', '#\n      -name "ROB_2"')
+    (backup / "SYSPAR" / "MOC.cfg").write_text(one_arm)
+    assert run(backup).exit_code == 0

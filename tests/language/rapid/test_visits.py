@@ -387,7 +387,10 @@ def test_external_axes_are_told():
 
 def test_a_trap_that_moves_leaves_everything():
     trap = f"TRAP stop\n{L.format('p2')}\nENDTRAP"
-    assert "TRAP" in reasons(task(L.format("p1"), more=trap))[0]
+    found = task(L.format("p1"), more=trap)
+    assert "TRAP" in reasons(found)[0]
+    (told,) = (d.message for d in found.diagnostics if d.code == "never-reached")
+    assert "an interrupt" in told and "remove" not in told
 
 
 def test_an_error_handler_that_moves_leaves_its_routine():
