@@ -183,8 +183,9 @@ class KrlTask(TaskSymbols[KrlFile]):
 
     @cached_property
     def outside_modes(self) -> frozenset[str]:
-        """Modes that other programs may leave otherwise than a program begins."""
-        found = (find_modes(one) for one in _sources(self.files_beside))
+        """Modes that any program may leave otherwise than a program begins."""
+        every = _sources((*self.files, *self.files_beside))
+        found = (find_modes(one) for one in every)
         return frozenset[str]().union(*found)
 
     @cached_property

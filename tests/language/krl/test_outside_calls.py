@@ -12,13 +12,16 @@ from postproc.language.text.source import Source
 from tests.language.krl.test_visits import CONFIG, DATA, reasons
 
 HOME = "PTP {A1 0,A2 -90,A3 90,A4 0,A5 10,A6 0}"
+PLAIN = "\n".join(
+    line for line in DATA.splitlines() if "#TCP" not in line and "#JOINT" not in line
+)
 FRAMES = ["$TOOL=TOOL_DATA[1]", "$BASE=BASE_DATA[2]"]
 
 
 def read(lines, other, more=""):
     texts = {
         "m.src": "DEF m( )\n{}\nEND\n{}".format("\n".join(lines), more),
-        "m.dat": f"DEFDAT m PUBLIC\n{DATA}\nENDDAT\n",
+        "m.dat": f"DEFDAT m PUBLIC\n{PLAIN}\nENDDAT\n",
         "$config.dat": CONFIG,
         "PROGRAMS/o.src": f"DEF o( )\n{other}\nEND\n",
     }
@@ -66,6 +69,11 @@ LOAD = "$LOAD={M 5,CM {X 0,Y 0,Z 0,A 0,B 0,C 0},J {X 0,Y 0,Z 0}}"
 def test_modes_are_known_that_no_program_sets(other, known):
     found = reasons(read([*FRAMES, LOAD, HOME, "LIN XP1"], other))
     assert (found == ["", ""]) == known
+
+
+def test_modes_that_it_leaves_itself_are_those_of_its_next_call():
+    lines = [*FRAMES, LOAD, HOME, "LIN XP1", "$ORI_TYPE=#JOINT"]
+    assert reasons(read(lines, "m( )"))[1]
 
 
 @pytest.mark.parametrize("other", ["LIN XP1", "x( )", "m2( )"])
