@@ -40,9 +40,13 @@ def alone(one: Given, cell, model, options):
 
 
 def said(outcome):
-    """Tell everything that comes of a program, but for the time that it took."""
+    """Tell everything that comes of a program, but for the time that it took.
+
+    Which files it was read from a batch knows by their places.
+    """
     if isinstance(outcome, Exception):
         return repr(outcome)
+    outcome = replace(outcome, record=replace(outcome.record, read={}))
     report = json.loads(report_text(outcome))
     del report["stages_s"]
     return outcome.outputs, outcome.sidecar, outcome.summary(), report
