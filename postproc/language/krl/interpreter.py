@@ -115,7 +115,8 @@ class KrlMachine(TaskMachine):
         main = TaskRoutine(0, first.name, first.routines[0])
         if main.rows.head.name not in self.task.outside_calls:
             self.call_routine(main, None, here)
-        self._begin_anywhere(here)
+        if self.task.outside_calls:
+            self._begin_anywhere(here)
         self.follow()
         for name, (file, row) in self._assumed.items():
             place, text = Scope(file, "", "", row=row), f"{name.upper()} {ASSUMED}"
