@@ -428,10 +428,7 @@ class FolderListing:
             folder: The folder.
             find: Finds it; it is asked once for a folder.
         """
-        if (folder, find) not in self._found:
-            self._found[folder, find] = find(folder, self)
-        found: T = self._found[folder, find]
-        return found
+        return self._keep((folder, find), lambda: find(folder, self))
 
     def beside(self, program: Path, find: Callable[[Path, FolderListing, str], T]) -> T:
         """Find something beside a program, once for all programs of a tree.
@@ -444,9 +441,13 @@ class FolderListing:
         folder = program.absolute().parent
         if self.root is None:
             return find(folder, self, program.name.lower())
-        if (folder, find) not in self._found:
-            self._found[folder, find] = find(folder, self, "")
-        found: T = self._found[folder, find]
+        return self._keep((folder, find), lambda: find(folder, self, ""))
+
+    def _keep(self, key: tuple[Path, object], find: Callable[[], T]) -> T:
+        """Return what was found for a key; find it first where nothing was."""
+        if key not in self._found:
+            self._found[key] = find()
+        found: T = self._found[key]
         return found
 
 

@@ -278,8 +278,8 @@ class _Digests:
         """Return the digest of the source of an output, of another file its own."""
         if path not in self.sources:
             record = sidecar_path(path)
-            told = read_without_edits(record) if record.exists() else None
-            source = None if told is None else told.source_of(path.name)
+            sidecar = read_without_edits(record) if record.exists() else None
+            source = None if sidecar is None else sidecar.source_of(path.name)
             self.sources[path] = source or self.of(path)
         return self.sources[path]
 

@@ -80,7 +80,7 @@ class FileName:
     @property
     def is_from_elsewhere(self) -> bool:
         """Tell whether it is the name of a file that a job has from another folder."""
-        return False
+        return self.is_apart
 
     def is_system(self) -> bool:
         """Tell whether the file on the disk is one of the controller or a package."""

@@ -117,11 +117,6 @@ class KrlFileName(FileName):
         return f"{OTHER_PROGRAMS}{path.name}" if apart else path.name
 
     @property
-    def is_from_elsewhere(self) -> bool:
-        """Tell whether it is the name of another program that changes shared data."""
-        return self.is_apart
-
-    @property
     def is_apart(self) -> bool:
         """Tell by the folder that its name begins with."""
         return self.place.startswith(OTHER_PROGRAMS)

@@ -77,11 +77,6 @@ class Pdl2FileName(FileName):
         return f"{OTHER_PROGRAMS}{PurePath(self.place).name}"
 
     @property
-    def is_from_elsewhere(self) -> bool:
-        """Tell whether it is the name of another program that changes variables."""
-        return self.is_apart
-
-    @property
     def is_apart(self) -> bool:
         """Tell by the folder that its name begins with."""
         return self.place.startswith(OTHER_PROGRAMS)
