@@ -89,10 +89,10 @@ def _find_others(folder: Path, listing: FolderListing, but: str) -> OtherProgram
     for other in others:
         values = listing.named(other.parent, f"{other.stem}{KrlFileName.data_lists}")
         own = (other,) if values is None else (other, values)
-        changed, called = _read_acts(*((one, *version_of(one)) for one in own))
-        changing += [own] if IMPORTS in changed or changed & shared else []
-        modal += [own] if MODES in changed and len(modal) < CALLERS else []
-        for name in called:
+        acts = _read_acts(*((one, *version_of(one)) for one in own))
+        changing += [own] if acts.imports or acts.changes & shared else []
+        modal += [own] if acts.modal and len(modal) < CALLERS else []
+        for name in acts.calls:
             calling[name].append(own)
     return OtherPrograms(changing, calling, modal)
 
@@ -115,15 +115,26 @@ def _list_shared(path: Path, changed: int, size: int) -> frozenset[str]:
     return frozenset(word.decode("latin-1").lower() for word in _WORD.findall(text))
 
 
-IMPORTS, MODES = "import", "$modes"
-"""Among the names that a program changes: it imports some, it leaves other modes."""
+@dataclass(frozen=True)
+class _OutsideActs:
+    """What a program does to others.
+
+    Attributes:
+        changes: Names of others' data that it may change.
+        calls: Names of routines that it calls and does not hold.
+        imports: It imports data of others.
+        modal: It leaves other modes than a program begins with.
+    """
+
+    changes: frozenset[str] = frozenset()
+    calls: frozenset[str] = frozenset()
+    imports: bool = False
+    modal: bool = False
 
 
 @lru_cache(READ_BEFORE)
-def _read_acts(
-    *versions: tuple[Path, int, int],
-) -> tuple[frozenset[str], frozenset[str]]:
-    """Return what a program may change of others' data, and what it calls of others.
+def _read_acts(*versions: tuple[Path, int, int]) -> _OutsideActs:
+    """Return what a program may do to others.
 
     Args:
         versions: The program and its data list, each as it is now.
@@ -131,13 +142,15 @@ def _read_acts(
     texts = {path.name: read_if_readable(path) for path, _, _ in versions}
     name, text = next(iter(texts.items()))
     if KrlFileName(name).is_system_source(text):
-        return frozenset(), frozenset()
+        return _OutsideActs()
     try:
         sources = [source_from_bytes(*one) for one in texts.items()]
         changes, calls = list_changes(*sources), list_calls(*sources)
     except ProgramError:
-        return frozenset(), frozenset()
-    more = [IMPORTS] if list_imports(sources) else []
-    more += [MODES] if any(map(find_modes, sources)) else []
-    changed = frozenset([*(one.name for one in changes), *more])
-    return changed, frozenset(one.name for one in calls)
+        return _OutsideActs()
+    return _OutsideActs(
+        frozenset(one.name for one in changes),
+        frozenset(one.name for one in calls),
+        bool(list_imports(sources)),
+        any(map(find_modes, sources)),
+    )

@@ -126,14 +126,13 @@ def _list_acts(source: Source) -> OutsideActs:
     exported = {n: key for n, key in exported.items() if n in whole.assigned}
     called = {name: _keys_of(program, name) for name in whole.calls}
     changes, calls = dict[str, int](), dict[str, int]()
-    rows = range(len(program.lines)) if exported or any(called.values()) else ()
-    for row in rows:
+    for row in range(len(program.lines)):
+        if not (exported or called):
+            break
         own, line = rows_effects(program, row, row + 1), program.lines.line(row)
-        for name in own.assigned & exported.keys():
-            changes.setdefault(exported[name], line)
+        changes |= {exported.pop(n): line for n in own.assigned & exported.keys()}
         for name in own.calls & called.keys():
-            for key in called.pop(name):
-                calls[key] = line
+            calls |= dict.fromkeys(called.pop(name), line)
     return OutsideActs(changes, calls)
 
 
